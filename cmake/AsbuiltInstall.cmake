@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+# `find_package(asbuilt)` after install.
+include(CMakePackageConfigHelpers)
+
+get_property(modules GLOBAL PROPERTY ASBUILT_MODULES)
+install(TARGETS ${modules} asbuilt_asbuilt EXPORT asbuiltTargets FILE_SET HEADERS)
+install(EXPORT asbuiltTargets NAMESPACE asbuilt:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/asbuilt)
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/asbuiltConfig.cmake.in ${PROJECT_BINARY_DIR}/asbuiltConfig.cmake
+                              INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/asbuilt)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/asbuiltConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/asbuiltConfig.cmake ${PROJECT_BINARY_DIR}/asbuiltConfigVersion.cmake
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/asbuilt)
