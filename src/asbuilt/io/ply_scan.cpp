@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <array>
+#include <string_view>
+
+#include "asbuilt/io/ply_body.h"
+#include "asbuilt/io/ply_header.h"
+#include "asbuilt/io/readers.h"
+#include "asbuilt/io/scan_assembly.h"
+
+namespace asbuilt::io {
+namespace {
+
+using Columns = std::array<StridedColumn, 3>;
+
+/// The three columns of these names, if all are there and none is a list.
+std::optional<Columns> columns_named(const PlyElement& element, const PlyTable& table,
+                                     const std::array<std::string_view, 3>& names) {
+  Columns columns;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto index = element.find(names[axis]);
+    if (!index || element.properties[*index].is_list()) return std::nullopt;
+    columns[axis] = table.columns[*index];
+  }
+  return columns;
+}
+
+std::optional<Columns> normal_columns(const PlyElement& element, const PlyTable& table) {
+  if (auto columns = columns_named(element, table, {"nx", "ny", "nz"})) return columns;
+  return columns_named(element, table, {"normal_x", "normal_y", "normal_z"});
+}
+
+auto row_of(const Columns& columns) {
+  return [columns](std::size_t row) { return Eigen::Vector3d(columns[0][row], columns[1][row], columns[2][row]); };
+}
+
+/// A sentence when what follows the vertices is damaged: a scan does not need it, but its reader should know.
+std::vector<std::string> notes_on_the_rest(PlyBody& body, const PlyHeader& header, std::size_t next_element) {
+  for (std::size_t e = next_element; e < header.elements.size(); ++e) {
+    if (const auto skipped = body.skip(header.elements[e]); !skipped) {
+      return {fmt::format("The points are complete, what follows them is not: {}.", skipped.error().message)};
+    }
+  }
+  std::vector<std::string> notes;
+  if (header.encoding == PlyEncoding::ascii && body.last_line_is_open()) {
+    notes.emplace_back("The last line has no line end: its last value may have been cut off.");
+  }
+  if (header.encoding != PlyEncoding::ascii && body.bytes_left() > 0) {
+    notes.push_back(fmt::format("{} bytes follow the last element; they were ignored.", body.bytes_left()));
+  }
+  return notes;
+}
+
+}  // namespace
+
+Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, const Input& input, Unit unit) {
+  ASBUILT_TRY(header, read_ply_header(input));
+  const auto vertex = header.find_element("vertex");
+  if (!vertex) return input.error("the PLY header declares no element 'vertex'");
+  const PlyElement& element = header.elements[*vertex];
+  if (element.rows == 0) return input.error("the PLY header declares 0 vertices, expected points");
+
+  PlyBody body(input, header);
+  for (std::size_t e = 0; e < *vertex; ++e) ASBUILT_CHECK(body.skip(header.elements[e]));
+  ASBUILT_TRY(table, body.read_scalars(element));
+  const auto positions = columns_named(element, table, {"x", "y", "z"});
+  if (!positions) return input.error("the vertices have no properties x, y and z");
+
+  RawPoints points{table.rows, row_of(*positions), {}};
+  if (const auto normals = normal_columns(element, table)) points.normal = row_of(*normals);
+  ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, unit);
+  std::ranges::move(notes_on_the_rest(body, header, *vertex + 1), std::back_inserter(scan.notes));
+  return std::vector<ScanFile>{std::move(scan)};
+}
+
+}  // namespace asbuilt::io

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/io/scan_file.h"
+
+#include <new>
+
+#include "asbuilt/io/file.h"
+#include "asbuilt/io/file_kind.h"
+#include "asbuilt/io/readers.h"
+#include "asbuilt/io/scan_assembly.h"
+
+namespace asbuilt::io {
+namespace {
+
+/// The vertices of a mesh, as structured-light software exports its scans.
+Result<std::vector<ScanFile>> scan_from_mesh(const std::filesystem::path& path, std::string format, const Input& input,
+                                             const Result<TriangleMesh>& read, Unit unit) {
+  if (!read) return tl::unexpected(read.error());
+  if (read->vertices.empty()) return input.error("the file holds no points");
+  const RawPoints points{read->vertices.size(), [&](std::size_t i) { return read->vertices[i]; }, {}};
+  ScanFile scan = assemble_scan(path, std::move(format), points, unit);
+  scan.notes.emplace_back("The file is a mesh: its vertices were taken as points.");
+  const bool is_text = scan.format != "stl binary";
+  if (is_text && !input.content.ends_with('\n')) {
+    scan.notes.emplace_back("The last line has no line end: its last value may have been cut off.");
+  }
+  return std::vector<ScanFile>{std::move(scan)};
+}
+
+Result<std::vector<ScanFile>> read_kind(FileKind kind, const std::filesystem::path& path, const Input& input,
+                                        Unit unit) {
+  switch (kind) {
+    case FileKind::ply:
+      return read_ply_scan(path, input, unit);
+    case FileKind::pcd:
+      return read_pcd_scan(path, input, unit);
+    case FileKind::text:
+      return read_text_scan(path, input, unit);
+    case FileKind::stl:
+      return scan_from_mesh(path, is_ascii_stl(input.content) ? "stl ascii" : "stl binary", input, read_stl_mesh(input),
+                            unit);
+    case FileKind::off:
+      return scan_from_mesh(path, "off", input, read_off_mesh(input), unit);
+    case FileKind::obj:
+      return scan_from_mesh(path, "obj", input, read_obj_mesh(input), unit);
+  }
+  throw std::logic_error("asbuilt: expected a kind of file");
+}
+
+}  // namespace
+
+Result<std::vector<ScanFile>> scans_from(const std::filesystem::path& path, const Input& input, Unit unit) {
+  try {
+    ASBUILT_TRY(kind, kind_of(path, input));
+    return read_kind(kind, path, input, unit);
+  } catch (const std::bad_alloc&) {
+    return input.error("the scan does not fit into memory");
+  }
+}
+
+Result<std::vector<ScanFile>> read_scans(const std::filesystem::path& path, Unit unit) {
+  ASBUILT_TRY(content, read_file(path));
+  return scans_from(path, {path.string(), content}, unit);
+}
+
+}  // namespace asbuilt::io
