@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/model/prepared_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "asbuilt/io/file.h"
+#include "asbuilt/model/byte_stream.h"
+#include "asbuilt/model/search_structures.h"
+
+namespace asbuilt::model {
+namespace {
+
+// A letter that no text begins with, then line ends that a transfer in text mode would spoil.
+constexpr std::string_view kMagic(
+    "\x89"
+    "ASBUILT-MODEL\r\n",
+    16);
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kDigestSize = 64;                                                  // hexadecimal digits
+constexpr std::size_t kHeaderSize = 16 + sizeof(std::uint32_t) + sizeof(std::uint64_t);  // magic, version, body's size
+
+// The numbers of the report, in the order of the file; new ones go to the end, with a new version.
+std::array<std::size_t*, 7> counts_of(PreparationReport& report) {
+  return {&report.triangles_in,  &report.vertices_welded, &report.degenerate_dropped, &report.duplicates_dropped,
+          &report.inner_dropped, &report.flipped,         &report.open_edges};
+}
+
+// One list of members for writing and reading.
+template <class Stream>
+void transfer(PreparedModel& model, const Stream& stream) {
+  stream(model.diameter);
+  stream(model.sampling_distance);
+  stream(model.skin.vertices);
+  stream(model.skin.triangles);
+  stream(model.samples.positions);
+  stream(model.samples.normals);
+  stream(model.dense_samples.positions);
+  stream(model.dense_samples.normals);
+  stream(model.source_path);
+  stream(model.source_sha256);
+}
+
+std::string body_of(PreparedModel model) {
+  ByteWriter writer;
+  transfer(model, [&](const auto& member) { writer.put(member); });
+  for (const std::size_t* count : counts_of(model.report)) writer.put(static_cast<std::uint64_t>(*count));
+  writer.put(static_cast<std::uint64_t>(model.report.notes.size()));
+  for (const std::string& note : model.report.notes) writer.put(note);
+  return writer.bytes();
+}
+
+bool read_body(std::string_view body, PreparedModel& model) {
+  ByteReader reader(body);
+  transfer(model, [&](auto& member) { reader.get(member); });
+  for (std::size_t* count : counts_of(model.report)) {
+    std::uint64_t value = 0;
+    reader.get(value);
+    *count = static_cast<std::size_t>(value);
+  }
+  std::uint64_t notes = 0;
+  reader.get(notes);
+  for (std::uint64_t i = 0; i < notes && reader.ok(); ++i) reader.get(model.report.notes.emplace_back());
+  return reader.at_end();
+}
+
+template <class Points>
+bool all_finite(const Points& points) {
+  return std::ranges::all_of(points, [](const auto& point) { return point.allFinite(); });
+}
+
+// The digest tells damage; this tells a file that was written wrongly, before it can hurt.
+bool is_consistent(const PreparedModel& model) {
+  const auto in_range = [&](const Eigen::Vector3i& t) {
+    return t.minCoeff() >= 0 && static_cast<std::size_t>(t.maxCoeff()) < model.skin.vertices.size();
+  };
+  const auto is_oriented = [](const PointCloud& cloud) {
+    return !cloud.empty() && cloud.normals.size() == cloud.size() && all_finite(cloud.positions) &&
+           all_finite(cloud.normals);
+  };
+  const bool has_size = model.diameter > 0.0 && std::isfinite(model.diameter) && model.sampling_distance > 0.0 &&
+                        model.sampling_distance <= model.diameter;
+  return has_size && !model.skin.empty() && all_finite(model.skin.vertices) &&
+         std::ranges::all_of(model.skin.triangles, in_range) && is_oriented(model.samples) &&
+         is_oriented(model.dense_samples);
+}
+
+}  // namespace
+
+Result<void> save_prepared(const std::filesystem::path& path, const PreparedModel& model) {
+  const std::string body = body_of(model);
+  ByteWriter header;
+  header.put(kVersion);
+  header.put(static_cast<std::uint64_t>(body.size()));
+  return io::write_file(path, std::string(kMagic) + header.bytes() + body + io::sha256(body));
+}
+
+Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Context& context) {
+  ASBUILT_TRY(content, io::read_file(path));
+  const auto refuse = [&](std::string_view what) {
+    return fail(ErrorCode::unreadable_input, fmt::format("{}: {}", path.string(), what));
+  };
+  if (!content.starts_with(kMagic)) return refuse("this is not a prepared model, as `asbuilt prepare` writes it");
+  if (content.size() < kHeaderSize) return refuse("the prepared model is cut off in its header; prepare it again");
+  ByteReader header(std::string_view(content).substr(kMagic.size(), kHeaderSize - kMagic.size()));
+  std::uint32_t version = 0;
+  std::uint64_t size = 0;
+  header.get(version);
+  header.get(size);
+  if (version != kVersion) {
+    return refuse(
+        fmt::format("the prepared model has format version {}, this program reads version {}; prepare it again "
+                    "with this program{}",
+                    version, kVersion, version > kVersion ? ", or use a newer one" : ""));
+  }
+  const std::size_t rest = content.size() - kHeaderSize;
+  if (size > rest || rest - size != kDigestSize) {
+    return refuse(
+        fmt::format("the prepared model has {} bytes after its header, {} + {} were announced; prepare it again", rest,
+                    size, kDigestSize));
+  }
+  const std::string_view body = std::string_view(content).substr(kHeaderSize, static_cast<std::size_t>(size));
+  if (io::sha256(body) != std::string_view(content).substr(content.size() - kDigestSize)) {
+    return refuse("the prepared model is damaged (its checksum does not match); prepare it again");
+  }
+  PreparedModel model;
+  if (!read_body(body, model) || !is_consistent(model)) {
+    return refuse("the prepared model contradicts itself; prepare it again");
+  }
+  build_search_structures(model, context);
+  if (context.cancelled()) return fail(ErrorCode::cancelled, "the loading of the model was stopped");
+  return model;
+}
+
+bool is_prepared_file(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return false;  // also keeps off pipes
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, kMagic.size()> beginning{};
+  file.read(beginning.data(), beginning.size());
+  return file.gcount() == static_cast<std::streamsize>(kMagic.size()) &&
+         std::string_view(beginning.data(), beginning.size()) == kMagic;
+}
+
+}  // namespace asbuilt::model
