@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/evaluate/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "asbuilt/core/kd_tree.h"
+#include "asbuilt/evaluate/surface_error.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/ply_writer.h"
+#include "asbuilt/model/surface_distance.h"
+
+namespace asbuilt::evaluate {
+namespace {
+
+constexpr std::uint8_t kPart = 1;  // label of the part's points
+
+using RecordByName = std::map<std::string, std::size_t>;
+
+// Scans of the record by file name. Two of one name could not be told apart.
+Result<RecordByName> scans_by_file_name(const io::RunRecord& record) {
+  RecordByName by_name;
+  for (std::size_t i = 0; i < record.scans.size(); ++i) {
+    const std::string name = std::filesystem::path(record.scans[i].path).filename().string();
+    if (by_name.try_emplace(name, i).second) continue;
+    return fail(ErrorCode::not_possible, fmt::format("the result holds two scans from files named {}", name));
+  }
+  return by_name;
+}
+
+// How well the part's points were found in a scan.
+struct SegmentFigures {
+  double precision = 0.0, recall = 0.0;
+};
+
+Result<SegmentFigures> segment_figures(const std::filesystem::path& file, const LabelledPoints& truth) {
+  ASBUILT_TRY(vertices, io::read_ply_vertices(file));
+  const auto *x = vertices.find("x"), *y = vertices.find("y"), *z = vertices.find("z"), *part = vertices.find("part");
+  if (x == nullptr || y == nullptr || z == nullptr) {
+    return fail(ErrorCode::unreadable_input, fmt::format("{}: has no columns x, y and z", file.string()));
+  }
+  std::vector<Eigen::Vector3f> points;
+  for (const Eigen::Vector3d& point : truth.points_in_scan) {
+    points.push_back(point.allFinite() ? Eigen::Vector3f(point.cast<float>()) : Eigen::Vector3f(1e30F, 1e30F, 1e30F));
+  }
+  const KdTree tree(points);
+  std::vector<bool> found(points.size(), false);
+  std::size_t claimed = 0, correct = 0;
+  for (std::size_t i = 0; i < x->size(); ++i) {
+    if (part != nullptr && (*part)[i] == 0.0) continue;  // the margin
+    ++claimed;
+    const Eigen::Vector3f point = Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]).cast<float>();
+    // The same point, but for what an offset taken off and put back may cost.
+    const auto nearest = tree.nearest(point, 1e-3F + 1e-6F * point.norm());
+    if (!nearest.found() || truth.labels[nearest.index] != kPart) continue;
+    ++correct;
+    found[nearest.index] = true;
+  }
+  const auto all = std::ranges::count(truth.labels, kPart), hits = std::ranges::count(found, true);
+  return SegmentFigures{claimed == 0 ? 0.0 : static_cast<double>(correct) / static_cast<double>(claimed),
+                        all == 0 ? 0.0 : static_cast<double>(hits) / static_cast<double>(all)};
+}
+
+// The part's points of all accepted scans, under our poses and under the true ones.
+struct PartPoints {
+  std::vector<Eigen::Vector3d> ours, truth;
+};
+
+void append(PartPoints& points, const LabelledPoints& scan, const Pose& ours, const Pose& truth) {
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (scan.labels[i] != kPart || !scan.points_in_scan[i].allFinite()) continue;
+    points.ours.push_back(ours * scan.points_in_scan[i]);
+    points.truth.push_back(truth * scan.points_in_scan[i]);
+  }
+}
+
+std::vector<Eigen::Vector3d> moved(const std::vector<Eigen::Vector3d>& points, const Pose& motion) {
+  std::vector<Eigen::Vector3d> result;
+  result.reserve(points.size());
+  for (const Eigen::Vector3d& point : points) result.push_back(motion * point);
+  return result;
+}
+
+// Mean distance to the surface after the best motion from either start: where the poses put the points, and where the
+// motion `towards_truth` does (the two differ when the whole result is off, for example by a symmetry).
+double aligned_mean_distance(const std::vector<Eigen::Vector3d>& points, const Pose& towards_truth,
+                             const TriangleMesh& mesh, const model::SurfaceDistance& surface, double noise_mm,
+                             const Context& context) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const Pose& start : {Pose(Pose::Identity()), towards_truth}) {
+    const Pose motion = best_motion_onto(points, mesh, surface, noise_mm, start, context);
+    best = std::min(best, mean_surface_distance(moved(points, motion), surface, context));
+  }
+  return best;
+}
+
+void judge_accuracy(Evaluation& evaluation, const PartPoints& points, const TriangleMesh& as_built,
+                    const Context& context) {
+  evaluation.part_points = points.ours.size();
+  if (points.ours.size() < 6) return;
+  const double sigma = evaluation.noise_sigma_mm;
+  const double noise_mm = sigma > 0.0 ? sigma : 1e-5 * evaluation.diameter_mm;
+  const Pose true_from_ours = best_rigid_motion(points.ours, points.truth);
+  const model::SurfaceDistance surface(as_built);
+  evaluation.mean_distance_mm =
+      aligned_mean_distance(points.ours, true_from_ours, as_built, surface, noise_mm, context);
+  evaluation.oracle_distance_mm =
+      aligned_mean_distance(points.truth, Pose::Identity(), as_built, surface, noise_mm, context);
+  if (*evaluation.oracle_distance_mm > 0.0) {
+    evaluation.ratio_to_oracle = *evaluation.mean_distance_mm / *evaluation.oracle_distance_mm;
+  }
+  double squares = 0.0;
+  for (std::size_t i = 0; i < points.ours.size(); ++i) {
+    squares += (true_from_ours * points.ours[i] - points.truth[i]).squaredNorm();
+  }
+  evaluation.relative_pose_error_mm = std::sqrt(squares / static_cast<double>(points.ours.size()));
+  if (sigma > 0.0) evaluation.relative_pose_error_sigma = *evaluation.relative_pose_error_mm / sigma;
+}
+
+ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, const TriangleMesh& model,
+                       const std::vector<Pose>& symmetries, double tolerance_mm) {
+  ScanFigures figures;
+  figures.name = truth.path.filename().string();
+  figures.present = truth.model_from_scan.has_value();
+  figures.occlusion = truth.occlusion;
+  figures.hidden = truth.hidden;
+  figures.clutter = truth.clutter;
+  if (record == nullptr) return figures;
+  figures.status = io::name_of(record->status);
+  figures.accepted = record->status == io::ScanStatus::accepted && record->model_from_scan.has_value();
+  if (figures.present && record->model_from_scan) {
+    figures.error = pose_error(*record->model_from_scan, *truth.model_from_scan, model, symmetries);
+  }
+  figures.right = figures.accepted && figures.error && figures.error->max_vertex_mm <= tolerance_mm;
+  return figures;
+}
+
+void count(Evaluation& evaluation, double tolerance_mm) {
+  for (const ScanFigures& scan : evaluation.per_scan) {
+    ++evaluation.scans;
+    evaluation.present += scan.present;
+    evaluation.accepted += scan.accepted;
+    evaluation.right += scan.right;
+    evaluation.wrong += scan.accepted && !scan.right;
+    evaluation.disconnected_right +=
+        scan.status == "disconnected" && scan.error && scan.error->max_vertex_mm <= tolerance_mm;
+  }
+  const auto share = [](std::size_t part, std::size_t whole) -> std::optional<double> {
+    if (whole == 0) return std::nullopt;
+    return static_cast<double>(part) / static_cast<double>(whole);
+  };
+  evaluation.recall = share(evaluation.right, evaluation.present);
+  evaluation.precision = share(evaluation.right, evaluation.accepted);
+}
+
+}  // namespace
+
+Result<void> EvaluateOptions::validate() const {
+  if (right_ratio > 0.0 && right_ratio < 1.0) return {};
+  return fail(ErrorCode::invalid_argument, fmt::format("right_ratio is {}, but must lie between 0 and 1", right_ratio));
+}
+
+Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, const std::filesystem::path& result_folder,
+                            const EvaluateOptions& options, const Context& context) {
+  ASBUILT_CHECK(options.validate());
+  ASBUILT_TRY(by_name, scans_by_file_name(record));
+  ASBUILT_TRY(model, io::read_mesh(truth.folder / truth.model, io::Unit::millimetre));
+  ASBUILT_TRY(as_built, io::read_mesh(truth.folder / truth.as_built, io::Unit::millimetre));
+
+  Evaluation evaluation;
+  evaluation.diameter_mm = diameter(model);
+  evaluation.noise_sigma_mm = truth.noise_sigma_mm;
+  const double tolerance_mm = options.right_ratio * evaluation.diameter_mm;
+  PartPoints points;
+  std::size_t known = 0;
+  for (const TrueScan& scan : truth.scans) {
+    if (context.cancelled()) return fail(ErrorCode::cancelled, "the evaluation was cancelled");
+    const auto found = by_name.find(scan.path.filename().string());
+    const io::ScanRecord* ours = found == by_name.end() ? nullptr : &record.scans[found->second];
+    known += ours != nullptr;
+    ScanFigures figures = figures_of(scan, ours, model, truth.symmetries, tolerance_mm);
+    if (ours != nullptr && figures.present && ours->model_from_scan && !scan.labels.empty()) {
+      ASBUILT_TRY(labelled, read_labelled_points(truth, scan));
+      if (figures.accepted) append(points, labelled, *ours->model_from_scan, *scan.model_from_scan);
+      const std::filesystem::path segment = result_folder / io::segment_file(found->second, ours->name);
+      if (std::error_code ignored; ours->has_segment() && std::filesystem::exists(segment, ignored)) {
+        ASBUILT_TRY(segmentation, segment_figures(segment, labelled));
+        figures.segment_precision = segmentation.precision;
+        figures.segment_recall = segmentation.recall;
+      }
+    }
+    evaluation.per_scan.push_back(std::move(figures));
+    context.report_progress(0.7 * static_cast<double>(evaluation.per_scan.size()) /
+                            static_cast<double>(truth.scans.size()));
+  }
+  if (known == 0 && !truth.scans.empty()) {
+    return fail(ErrorCode::not_possible,
+                fmt::format("none of the {} scans of the truth is in the result; scans are matched by file name, the "
+                            "first is {}",
+                            truth.scans.size(), truth.scans.front().path.filename().string()));
+  }
+  count(evaluation, tolerance_mm);
+  judge_accuracy(evaluation, points, as_built, context);
+  context.report_progress(1.0);
+  return evaluation;
+}
+
+Result<Evaluation> evaluate(const std::filesystem::path& truth_path, const std::filesystem::path& result_folder,
+                            const EvaluateOptions& options, const Context& context) {
+  ASBUILT_TRY(truth, read_truth(truth_path));
+  ASBUILT_TRY(record, io::read_run_record(result_folder / "result.json"));
+  return evaluate(truth, record, result_folder, options, context);
+}
+
+}  // namespace asbuilt::evaluate

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/evaluate/evaluate.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "asbuilt/io/file.h"
+#include "asbuilt/io/ply_writer.h"
+#include "scenario.h"
+#include "support/matchers.h"
+
+namespace asbuilt::evaluate {
+namespace {
+
+using test::Scenario;
+
+TEST(Evaluate, TruePosesAreAllRightWithRatioOneAndNoError) {
+  const Scenario scenario("true_poses");
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.scans, 4U);
+  EXPECT_EQ(evaluation.present, 3U);
+  EXPECT_EQ(evaluation.accepted, 3U);
+  EXPECT_EQ(evaluation.right, 3U);
+  EXPECT_EQ(evaluation.wrong, 0U);
+  EXPECT_EQ(evaluation.recall, 1.0);
+  EXPECT_EQ(evaluation.precision, 1.0);
+  EXPECT_NEAR(*evaluation.ratio_to_oracle, 1.0, 1e-9);
+  EXPECT_NEAR(*evaluation.relative_pose_error_sigma, 0.0, 1e-9);
+  // The mean distance of points with normal noise lies below sigma, and not far below.
+  EXPECT_LT(*evaluation.oracle_distance_mm, evaluation.noise_sigma_mm);
+  EXPECT_GT(*evaluation.oracle_distance_mm, 0.2 * evaluation.noise_sigma_mm);
+}
+
+TEST(Evaluate, ACommonMotionOfAllPosesCostsNothing) {
+  Scenario scenario("common_motion");
+  Vector6d twist;
+  twist << 0.003, -0.002, 0.004, 0.8, -0.5, 0.3;
+  for (io::ScanRecord& scan : scenario.record.scans) {
+    if (scan.model_from_scan) scan.model_from_scan = pose_from_twist(twist) * *scan.model_from_scan;
+  }
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.right, 3U);
+  EXPECT_NEAR(*evaluation.ratio_to_oracle, 1.0, 1e-4);
+  EXPECT_NEAR(*evaluation.relative_pose_error_sigma, 0.0, 1e-6);
+  EXPECT_GT(evaluation.per_scan[scenario.first_present()].error->add_mm, 0.5);
+}
+
+TEST(Evaluate, RelativePoseErrorOfOppositeShiftsIsTheirWeightedSpread) {
+  Scenario scenario("opposite_shifts", 0.5);  // two scans with the part
+  const double shift = 0.4;
+  std::vector<double> counts;
+  for (std::size_t i = 0; i < 4; ++i) {
+    auto& pose = scenario.record.scans[i].model_from_scan;
+    if (!pose) continue;
+    pose = Pose(Eigen::Translation3d(counts.empty() ? shift : -shift, 0, 0)) * *pose;
+    counts.push_back(static_cast<double>(std::ranges::count(scenario.simulation.scans[i].labels, 1)));
+  }
+  ASSERT_EQ(counts.size(), 2U);
+  // If G could only shift: two clusters 2 s apart with shares p and 1 - p spread by 2 s sqrt(p (1 - p)).
+  // A turn of G lets it take off a little more where the scans see different sides.
+  const double p = counts[0] / (counts[0] + counts[1]), most = 2.0 * shift * std::sqrt(p * (1.0 - p));
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_LE(*evaluation.relative_pose_error_mm, most + 1e-9);
+  EXPECT_GT(*evaluation.relative_pose_error_mm, 0.5 * most);
+  EXPECT_NEAR(*evaluation.relative_pose_error_sigma, *evaluation.relative_pose_error_mm / evaluation.noise_sigma_mm,
+              1e-12);
+  EXPECT_GT(*evaluation.ratio_to_oracle, 1.1);
+}
+
+TEST(Evaluate, RightEndsAtTwoPercentOfTheDiameter) {
+  for (const double share : {0.0199, 0.0201}) {
+    Scenario scenario("tolerance");
+    auto& pose = *scenario.record.scans[scenario.first_present()].model_from_scan;
+    pose = Pose(Eigen::Translation3d(0, share * diameter(scenario.simulation.model), 0)) * pose;
+    const Evaluation evaluation = scenario.evaluated().value();
+    EXPECT_EQ(evaluation.right, share < 0.02 ? 3U : 2U);
+    EXPECT_EQ(evaluation.wrong, share < 0.02 ? 0U : 1U);
+  }
+}
+
+TEST(Evaluate, AnAcceptedPoseWhereThePartIsNotIsWrong) {
+  Scenario scenario("absent");
+  for (io::ScanRecord& scan : scenario.record.scans) {
+    scan.status = io::ScanStatus::accepted;
+    if (!scan.model_from_scan) scan.model_from_scan = Pose::Identity();
+  }
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.accepted, 4U);
+  EXPECT_EQ(evaluation.wrong, 1U);
+  EXPECT_DOUBLE_EQ(*evaluation.precision, 0.75);
+  EXPECT_DOUBLE_EQ(*evaluation.recall, 1.0);
+}
+
+TEST(Evaluate, MissingAndRejectedScansLowerRecallOnly) {
+  Scenario scenario("missing");
+  const std::size_t first = scenario.first_present();
+  scenario.record.scans.erase(scenario.record.scans.begin() + static_cast<std::ptrdiff_t>(first));
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.per_scan[first].status, "missing");
+  EXPECT_DOUBLE_EQ(*evaluation.recall, 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(*evaluation.precision, 1.0);
+}
+
+TEST(Evaluate, DisconnectedScansAreNotAcceptedButTold) {
+  Scenario scenario("disconnected");
+  scenario.record.scans[scenario.first_present()].status = io::ScanStatus::disconnected;
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.accepted, 2U);
+  EXPECT_EQ(evaluation.disconnected_right, 1U);
+}
+
+TEST(Evaluate, NothingAcceptedHasNoRatio) {
+  Scenario scenario("nothing");
+  for (io::ScanRecord& scan : scenario.record.scans) {
+    scan.status = io::ScanStatus::rejected;
+    scan.model_from_scan.reset();
+  }
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_FALSE(evaluation.ratio_to_oracle.has_value());
+  EXPECT_FALSE(evaluation.precision.has_value());
+  EXPECT_EQ(evaluation.recall, 0.0);
+  EXPECT_TRUE(nlohmann::json::parse(to_json(evaluation))["ratio_to_oracle"].is_null());
+}
+
+TEST(Evaluate, SegmentsAreJudgedPointByPoint) {
+  Scenario scenario("segments");
+  const std::size_t index = scenario.first_present();
+  const simulate::SimulatedScan& scan = scenario.simulation.scans[index];
+  // Every other point of the part, as many points of other things as half of those, and a margin that must not count.
+  std::vector<float> x, y, z;
+  std::vector<std::uint8_t> part;
+  const auto add = [&](std::size_t i, int flag) {
+    x.push_back(scan.points_in_scan[i].x());
+    y.push_back(scan.points_in_scan[i].y());
+    z.push_back(scan.points_in_scan[i].z());
+    part.push_back(static_cast<std::uint8_t>(flag));
+  };
+  std::size_t seen = 0, taken = 0, others = 0;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (scan.labels[i] == 1 && seen++ % 2 == 0) add(i, ++taken > 0);
+  }
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (scan.labels[i] != 1) add(i, 2 * others < taken ? (++others, 1) : 0);
+  }
+  scenario.record.scans[index].segment_points = taken + others;
+  const auto file = scenario.folder / "result" / io::segment_file(index, scan.name);
+  std::filesystem::create_directories(file.parent_path());
+  const std::vector<io::PlyColumn> columns{{"x", std::span<const float>(x)},
+                                           {"y", std::span<const float>(y)},
+                                           {"z", std::span<const float>(z)},
+                                           {"part", std::span<const std::uint8_t>(part)}};
+  ASSERT_TRUE(io::write_ply(file, columns).has_value());
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_NEAR(*evaluation.per_scan[index].segment_precision,
+              static_cast<double>(taken) / static_cast<double>(taken + others), 1e-12);
+  EXPECT_NEAR(*evaluation.per_scan[index].segment_recall, static_cast<double>(taken) / static_cast<double>(seen),
+              1e-12);
+}
+
+TEST(Evaluate, TwoScansOfOneNameAndForeignResultsAreErrors) {
+  Scenario scenario("names");
+  scenario.record.scans[1].path = "elsewhere/scan_00.ply";
+  EXPECT_THAT(scenario.evaluated(), test::FailsWith(ErrorCode::not_possible));
+  for (io::ScanRecord& scan : scenario.record.scans) scan.path = "other_" + scan.name + ".ply";
+  EXPECT_THAT(scenario.evaluated(), test::FailsWith(ErrorCode::not_possible));
+}
+
+TEST(Evaluate, ReadsTheResultFolderAndWritesJsonAndATable) {
+  Scenario scenario("folder");
+  std::filesystem::create_directories(scenario.folder / "result");
+  EXPECT_THAT(evaluate(scenario.folder, scenario.folder / "result", {}, Context(1)),
+              test::FailsWith(ErrorCode::unreadable_input));
+  ASSERT_TRUE(io::write_file(scenario.folder / "result" / "result.json", io::to_json(scenario.record)).has_value());
+  const Evaluation evaluation =
+      evaluate(scenario.folder / "truth.json", scenario.folder / "result", {}, Context(1)).value();
+  const auto json = nlohmann::json::parse(to_json(evaluation));
+  EXPECT_EQ(json["accepted"], 3);
+  EXPECT_EQ(json["present"], 3);
+  EXPECT_EQ(json["wrong"], 0);
+  EXPECT_NEAR(json["ratio_to_oracle"].get<double>(), 1.0, 1e-9);
+  EXPECT_EQ(json["per_scan"].size(), 4U);
+  EXPECT_THAT(to_table(evaluation), testing::HasSubstr("accepted 3 of 3"));
+}
+
+TEST(Evaluate, AToleranceThatMakesNoSenseIsAnError) {
+  const Scenario scenario("options");
+  const Truth truth = read_truth(scenario.folder).value();
+  EXPECT_THAT(evaluate(truth, scenario.record, scenario.folder, EvaluateOptions{0.0}, Context(1)),
+              test::FailsWith(ErrorCode::invalid_argument));
+}
+
+}  // namespace
+}  // namespace asbuilt::evaluate
