@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/scan/scan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/scan/normals.h"
+
+namespace asbuilt::scan {
+namespace {
+
+constexpr std::size_t kFewestPoints = 3;
+
+Viewpoint choose_viewpoint(const Scan& scan, std::span<const Eigen::Vector3f> file_normals,
+                           const std::optional<Eigen::Vector3d>& file_viewpoint, const ViewpointRequest& request,
+                           std::vector<std::string>& warnings) {
+  if (!request.automatic) return request.stated;
+  if (file_viewpoint) return {Viewpoint::Kind::point, *file_viewpoint};
+  const Viewpoint origin{Viewpoint::Kind::point, Eigen::Vector3d::Zero()};
+  if (agrees_with_depth_order(scan.cloud.positions, scan.cloud.normals, file_normals, scan.spacing_mm, origin)) {
+    return origin;
+  }
+  warnings.push_back(
+      "the points are not ordered as a sensor at the scan's origin would see them, so no viewpoint is used; "
+      "state it with --viewpoint");
+  return {};
+}
+
+void turn(std::vector<Eigen::Vector3f>& normals, const Context& context, const auto& wanted_direction) {
+  parallel_for(context, normals.size(), 4096, [&](std::size_t i) {
+    if (normals[i].dot(wanted_direction(i)) < 0.0F) normals[i] = -normals[i];
+  });
+}
+
+// Signs from the viewpoint, else from the file (whose normals give the sign at most), else none.
+bool orient_normals(Scan& scan, std::span<const Eigen::Vector3f> file_normals, bool use_file, const Context& context) {
+  if (scan.viewpoint.known()) {
+    turn(scan.cloud.normals, context, [&](std::size_t i) -> Eigen::Vector3f {
+      return scan.viewpoint.towards_sensor(scan.cloud.positions[i].cast<double>()).cast<float>();
+    });
+    return true;
+  }
+  if (!use_file || file_normals.empty()) return false;
+  turn(scan.cloud.normals, context, [&](std::size_t i) { return file_normals[i]; });
+  return true;
+}
+
+}  // namespace
+
+Result<void> ScanOptions::validate() const {
+  if (noise_sigma_mm >= 0.0 && std::isfinite(noise_sigma_mm)) return {};
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("the sensor noise is {} mm, expected a finite number of at least 0", noise_sigma_mm));
+}
+
+Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vector3d>& file_viewpoint,
+                          const ViewpointRequest& request, const ScanOptions& options, const Context& context) {
+  ASBUILT_CHECK(options.validate());
+  Sanitised clean = sanitise(raw, context);
+  const SanitiserReport& report = clean.report;
+  if (clean.cloud.size() < kFewestPoints) {
+    return fail(
+        ErrorCode::unreadable_input,
+        fmt::format("{} usable points of {} ({} not finite, {} at the origin, {} duplicates), expected at least {}",
+                    clean.cloud.size(), report.points_in, report.not_finite, report.no_return, report.duplicates,
+                    kFewestPoints));
+  }
+
+  Scan scan;
+  scan.source_index = std::move(clean.source_index);
+  scan.report = report;
+  scan.cloud.positions = std::move(clean.cloud.positions);
+  const std::vector<Eigen::Vector3f> file_normals = std::move(clean.cloud.normals);
+
+  const KdTree tree(scan.cloud.positions);
+  scan.spacing_mm = median_spacing(scan.cloud.positions, tree);
+  scan.noise_sigma_mm =
+      options.noise_sigma_mm > 0.0 ? options.noise_sigma_mm : estimate_noise(scan.cloud.positions, tree, context);
+  FittedNormals fitted =
+      fitted_normals(scan.cloud.positions, tree, neighbours_for_normals(scan.noise_sigma_mm, scan.spacing_mm), context);
+  scan.cloud.normals = std::move(fitted.normals);
+  scan.surface_variation = std::move(fitted.variation);
+  if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
+  scan.viewpoint = choose_viewpoint(scan, file_normals, file_viewpoint, request, scan.warnings);
+  scan.normals_oriented = orient_normals(scan, file_normals, options.use_file_normals, context);
+  return scan;
+}
+
+PointCloud downsample(const Scan& scan, double spacing_mm, double normal_radius_mm, const Context& context) {
+  const std::vector<Eigen::Vector3f>& positions = scan.cloud.positions;
+  const std::vector<std::uint32_t> chosen = even_subset(positions, spacing_mm, context);
+  // A fit needs some hundred points at most: thin the source first where it is denser than that.
+  constexpr double kFitPointsAcross = 14.0;
+  const double fit_spacing = 2.0 * normal_radius_mm / kFitPointsAcross;
+  std::vector<Eigen::Vector3f> source;
+  if (scan.spacing_mm < 0.7 * fit_spacing) {
+    for (const std::uint32_t i : even_subset(positions, fit_spacing, context)) source.push_back(positions[i]);
+  } else {
+    source = positions;
+  }
+  const KdTree tree(source);
+
+  PointCloud samples;
+  samples.positions.resize(chosen.size());
+  samples.normals.resize(chosen.size());
+  parallel_for_blocks(context, chosen.size(), 256, [&](std::size_t begin, std::size_t end) {
+    constexpr std::size_t kFewest = 8;
+    std::vector<KdTree::Neighbour> neighbours;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3f& point = positions[chosen[i]];
+      const Eigen::Vector3f& fine_normal = scan.cloud.normals[chosen[i]];
+      samples.positions[i] = point;
+      samples.normals[i] = fine_normal;
+      tree.within(point, static_cast<float>(normal_radius_mm), neighbours);
+      if (neighbours.size() < kFewest) continue;
+      const Eigen::Vector3f coarse_normal = fit_plane(source, neighbours).normal;
+      if (coarse_normal.isZero(0.0F)) continue;
+      samples.normals[i] = coarse_normal.dot(fine_normal) < 0.0F ? Eigen::Vector3f(-coarse_normal) : coarse_normal;
+    }
+  });
+  // Where the coarse fit turned a normal past the silhouette, the viewpoint has the last word.
+  if (scan.viewpoint.known()) {
+    turn(samples.normals, context, [&](std::size_t i) -> Eigen::Vector3f {
+      return scan.viewpoint.towards_sensor(samples.positions[i].cast<double>()).cast<float>();
+    });
+  }
+  return samples;
+}
+
+}  // namespace asbuilt::scan
