@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "asbuilt/core/result.h"
+
+namespace asbuilt::detect {
+
+struct DetectOptions {
+  int angle_bins = 15;              ///< bins over [0, pi] for each of the three angles of Eq. 6
+  double distance_bin_ratio = 1.0;  ///< width of a distance bin / sampling distance d
+  int neighbour_bins = 4;           ///< K of Eq. 8, at most 16 (a feature has 2^4 border neighbours); > 1
+  double border_reach = 0.35;  ///< a neighbouring bin counts only for values this close to it, in bins (0.5: always)
+  double bucket_weight_exponent = 0.3;   ///< e of a vote's weight N_b^-e; paper: 1, which lets rare features rule
+  double bucket_cap = 4.0;               ///< buckets with more than this many entries per model sample do not vote
+  int alpha_bins = 30;                   ///< bins over (-pi, pi] for the rotation about the normal
+  int reference_points = 1000;           ///< scene reference points; paper: 400-1000
+  int max_hypotheses = 200;              ///< clusters handed to verification; paper: some 50
+  double cluster_angle_deg = 15.0;       ///< poses closer than this in rotation ...
+  double cluster_distance_ratio = 0.06;  ///< ... and than this share of the diameter at the model's centre are one
+  int peaks_per_reference = 3;           ///< maxima of one voting space that are kept, if close to the best
+  double peak_ratio = 0.85;              ///< "close": share of the best maximum's votes
+  bool paper_mode = false;               ///< exactly the published method
+
+  [[nodiscard]] Result<void> validate() const;
+
+  /// The published method: K bins always, every bucket votes, one maximum per reference point, 50 clusters.
+  [[nodiscard]] DetectOptions as_published() const {
+    DetectOptions published = *this;
+    published.paper_mode = true;
+    published.bucket_weight_exponent = 1.0;
+    published.border_reach = 0.5;
+    published.peaks_per_reference = 1;
+    published.max_hypotheses = 50;
+    return published;
+  }
+};
+
+template <class Visitor>
+void for_each_field(DetectOptions& options, Visitor&& field) {
+  field("angle_bins", options.angle_bins, "bins over [0, 180] degrees for each angle of a point pair feature");
+  field("distance_bin_ratio", options.distance_bin_ratio, "width of a distance bin / sampling distance");
+  field("neighbour_bins", options.neighbour_bins, "K, bins that a scene feature activates (Eq. 8)");
+  field("border_reach", options.border_reach, "how close to a border a value must lie for the bin beyond to count");
+  field("bucket_weight_exponent", options.bucket_weight_exponent, "e of a vote's weight N_b^-e (paper: 1)");
+  field("bucket_cap", options.bucket_cap, "buckets with more entries per model sample do not vote");
+  field("alpha_bins", options.alpha_bins, "bins for the rotation about the reference normal");
+  field("reference_points", options.reference_points, "scene reference points");
+  field("max_hypotheses", options.max_hypotheses, "pose clusters handed to verification");
+  field("cluster_angle_deg", options.cluster_angle_deg, "rotation within which hypotheses are one pose");
+  field("cluster_distance_ratio", options.cluster_distance_ratio, "distance / diameter within which they are");
+  field("peaks_per_reference", options.peaks_per_reference, "maxima kept per reference point");
+  field("peak_ratio", options.peak_ratio, "votes of a further maximum / votes of the best");
+}
+
+}  // namespace asbuilt::detect

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/detect/voting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace asbuilt::detect {
+namespace {
+
+constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
+
+std::uint16_t fraction_of_turn(float angle) {
+  return static_cast<std::uint16_t>(static_cast<std::int32_t>(std::lround(angle / kTurn * 65536.0F)));
+}
+
+}  // namespace
+
+LocalVoting::LocalVoting(const Codebook& codebook, const Scene& scene, const DetectOptions& options)
+    : codebook_(codebook), scene_(scene), options_(options) {
+  votes_.resize(codebook.samples.size() * static_cast<std::size_t>(options.alpha_bins));
+  if (!options.paper_mode) voter_.resize(votes_.size());
+}
+
+void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector3f& reference_normal,
+                           const Eigen::Vector3f& other, const Eigen::Vector3f& other_normal, float scene_angle) {
+  const PointPairFeature feature = point_pair_feature(reference, reference_normal, other, other_normal);
+  const Quantisation::Bins bins =
+      codebook_.quantisation.soft_bins(feature, options_.neighbour_bins, static_cast<float>(options_.border_reach));
+  if (bins.count == 0) return;
+  const auto alpha_bins = static_cast<std::uint32_t>(options_.alpha_bins);
+  const std::uint16_t angle = fraction_of_turn(scene_angle);
+  // p(f_k | f) = 1 / K: K is what the options say, also where a neighbour does not exist.
+  const float feature_weight = 1.0F / static_cast<float>(options_.paper_mode ? options_.neighbour_bins : bins.count);
+  if (++pair_ == 0) {
+    std::ranges::fill(voter_, std::uint16_t{0});
+    pair_ = 1;
+  }
+  for (int k = 0; k < bins.count; ++k) {
+    const std::span<const Codebook::Entry> bucket = codebook_.bucket(bins.bin[static_cast<std::size_t>(k)]);
+    if (bucket.empty() || bucket.size() > codebook_.largest_voting_bucket) continue;
+    const float weight = feature_weight * codebook_.bucket_weight[bins.bin[static_cast<std::size_t>(k)]];
+    if (options_.paper_mode) {
+      for (const Codebook::Entry& entry : bucket) {
+        const auto alpha = static_cast<std::uint16_t>(angle - entry.angle);
+        votes_[entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16)] += weight;
+      }
+      continue;
+    }
+    for (const Codebook::Entry& entry : bucket) {
+      const auto alpha = static_cast<std::uint16_t>(angle - entry.angle);
+      const std::uint32_t cell = entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16);
+      // One pair is one witness: it must not vote twice for a cell because the model repeats itself there.
+      votes_[cell] += voter_[cell] == pair_ ? 0.0F : weight;
+      voter_[cell] = pair_;
+    }
+  }
+}
+
+std::vector<Peak> LocalVoting::vote(std::uint32_t reference, float sign) {
+  std::ranges::fill(votes_, 0.0F);
+  std::ranges::fill(voter_, std::uint16_t{0});
+  pair_ = 0;
+  const Eigen::Vector3f point = scene_.samples.positions[reference];
+  const Eigen::Vector3f normal = sign * scene_.samples.normals[reference];
+  const Pose frame = local_frame(point, normal);
+  const Eigen::Matrix3f rotation = frame.linear().cast<float>();
+  // No pair of the part is longer; half a sampling distance is lost to sampling at either end.
+  const auto reach = static_cast<float>(codebook_.longest_pair + 0.5 * codebook_.sampling_distance);
+  const auto closest = static_cast<float>(0.5 * codebook_.sampling_distance);
+  for (std::size_t i = 0; i < scene_.samples.size(); ++i) {
+    const Eigen::Vector3f offset = scene_.samples.positions[i] - point;
+    const float squared = offset.squaredNorm();
+    if (squared > reach * reach || squared < closest * closest) continue;
+    const float angle = angle_in_frame(rotation, offset);
+    const Eigen::Vector3f& other_normal = scene_.samples.normals[i];
+    add_pair(point, normal, scene_.samples.positions[i], other_normal, angle);
+    if (!scene_.normals_oriented) add_pair(point, normal, scene_.samples.positions[i], -other_normal, angle);
+  }
+  return peaks(frame, point);
+}
+
+std::vector<Peak> LocalVoting::peaks(const Pose& scene_frame, const Eigen::Vector3f& reference) const {
+  const int bins = options_.alpha_bins;
+  const bool smooth = !options_.paper_mode;
+  const Eigen::Vector3d towards_sensor = scene_.viewpoint.towards_sensor(reference.cast<double>());
+  const bool check_view = scene_.viewpoint.known() && !codebook_.seen_from.empty();
+  std::vector<Peak> best_of_sample;
+  for (std::size_t m = 0; m < codebook_.samples.size(); ++m) {
+    const float* row = votes_.data() + m * static_cast<std::size_t>(bins);
+    // A true alpha near a border splits its votes over two bins; neighbours are counted at half.
+    const auto value = [&](int bin) {
+      const int wrapped = (bin + bins) % bins;
+      return row[wrapped] + (smooth ? 0.5F * (row[(wrapped + bins - 1) % bins] + row[(wrapped + 1) % bins]) : 0.0F);
+    };
+    int best = 0;
+    for (int bin = 1; bin < bins; ++bin) {
+      if (value(bin) > value(best)) best = bin;
+    }
+    const float height = value(best);
+    if (!(height > 0.0F)) continue;
+    float shift = 0.0F;
+    if (smooth) {
+      const float left = value(best - 1), right = value(best + 1);
+      const float curvature = left - 2.0F * height + right;
+      if (curvature < 0.0F) shift = std::clamp(0.5F * (left - right) / curvature, -0.5F, 0.5F);
+    }
+    const float alpha = (static_cast<float>(best) + 0.5F + shift) * kTurn / static_cast<float>(bins);
+    best_of_sample.push_back({static_cast<std::uint32_t>(m), alpha, height});
+  }
+  std::ranges::sort(best_of_sample, [](const Peak& a, const Peak& b) {
+    return a.votes != b.votes ? a.votes > b.votes : a.model_sample < b.model_sample;
+  });
+
+  std::vector<Peak> kept;
+  for (const Peak& peak : best_of_sample) {
+    if (kept.size() == static_cast<std::size_t>(options_.peaks_per_reference)) break;
+    if (!kept.empty() && peak.votes < static_cast<float>(options_.peak_ratio) * kept.front().votes) break;
+    if (check_view) {
+      const Pose pose = model_from_scan_of(codebook_.frames[peak.model_sample], scene_frame, peak.alpha);
+      const int view = ViewMask::nearest_direction((pose.linear() * towards_sensor).cast<float>());
+      if (!codebook_.seen_from[peak.model_sample].test(view)) continue;
+    }
+    kept.push_back(peak);
+  }
+  return kept;
+}
+
+}  // namespace asbuilt::detect
