@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/evidence.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace asbuilt::verify {
+namespace {
+
+using Evidence = scan::DepthImage::Evidence;
+
+constexpr double kGrazing = 0.2;  // surfaces seen flatter than this (78 degrees) return too little to be asked for
+
+double ratio(double part, double whole) { return whole > 0.0 ? part / whole : 0.0; }
+
+scan::Scan without(const scan::Scan& scan, const std::vector<std::uint8_t>& background) {
+  scan::Scan rest;
+  rest.viewpoint = scan.viewpoint;
+  rest.normals_oriented = scan.normals_oriented;
+  rest.spacing_mm = scan.spacing_mm;
+  rest.noise_sigma_mm = scan.noise_sigma_mm;
+  for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
+    if (background[i] != 0) continue;
+    rest.cloud.positions.push_back(scan.cloud.positions[i]);
+    rest.cloud.normals.push_back(scan.cloud.normals[i]);
+    rest.surface_variation.push_back(scan.surface_variation[i]);
+  }
+  return rest;
+}
+
+// Without a viewpoint the sensor is taken to be far away, on the side to which the surface points on average: by the
+// scan's normals, or, where their signs mean nothing, by those of the model's faces that the points lie on at this
+// pose.
+Eigen::Vector3d mean_direction(const Pose& model_from_scan, const model::PreparedModel& model, const ScanEvidence& scan,
+                               double distance_mm) {
+  const Eigen::Vector3d centre = model_from_scan.inverse() * model.box.center().eval();
+  std::vector<KdTree::Neighbour> members;
+  scan.foreground_tree.within(centre.cast<float>(), static_cast<float>(0.5 * model.diameter), members);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const KdTree::Neighbour& member : members) {
+    if (scan.scan.normals_oriented) {
+      sum += scan.foreground.cloud.normals[member.index].cast<double>();
+      continue;
+    }
+    const Eigen::Vector3d point = model_from_scan * scan.foreground.cloud.positions[member.index].cast<double>();
+    const model::DistanceField::Sample sample = model.field->at(point.cast<float>());
+    if (!sample.known() || std::abs(sample.distance) > distance_mm) continue;
+    sum += model_from_scan.linear().transpose() *
+           model.face_normals[static_cast<std::size_t>(sample.triangle)].cast<double>();
+  }
+  return sum.norm() > 0.0 ? Eigen::Vector3d(sum.normalized()) : Eigen::Vector3d::Zero();
+}
+
+class Judge {
+ public:
+  Judge(const Pose& model_from_scan, const model::PreparedModel& model, const ScanEvidence& scan,
+        const EvidenceOptions& options)
+      : scan_from_model_(model_from_scan.inverse()), model_(model), scan_(scan), options_(options) {
+    centre_ = model.box.center();
+    if (!scan.scan.viewpoint.known()) {
+      parallel_direction_ = mean_direction(model_from_scan, model, scan, options.distance_mm);
+    }
+  }
+
+  void add(const Eigen::Vector3f& point_in_model, const Eigen::Vector3f& normal_in_model, PoseEvidence& sum) const {
+    ++sum.samples;
+    const Eigen::Vector3d point = scan_from_model_ * point_in_model.cast<double>();
+    const Eigen::Vector3d normal = scan_from_model_.linear() * normal_in_model.cast<double>();
+    const bool is_there = has_surface(point, normal);
+    sum.explained_anywhere += is_there ? 1 : 0;
+    const Eigen::Vector3d towards =
+        scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
+    const double cosine = normal.dot(towards);
+    if (cosine < kGrazing || is_behind_part(point_in_model, normal_in_model, towards)) return;
+    sum.facing += cosine;
+    if (is_there) {
+      sum.explained += cosine;
+      ++sum.explained_samples;
+      const Eigen::Vector3d lever = (point_in_model.cast<double>() - centre_) / (0.5 * model_.diameter);
+      Vector6d row;
+      row << lever.cross(normal_in_model.cast<double>()), normal_in_model.cast<double>();
+      sum.information += row * row.transpose();
+    } else if (!scan_.depth) {
+      sum.missing += cosine;
+    } else {
+      const double tolerance = (options_.distance_mm + options_.lateral_mm) / cosine;
+      switch (scan_.depth->evidence(point, tolerance)) {
+        case Evidence::near:
+          sum.contradicted += cosine;
+          break;
+        case Evidence::hidden:
+          sum.hidden += cosine;
+          break;
+        case Evidence::free:
+          sum.seen_through += cosine;
+          break;
+        case Evidence::unknown:
+          sum.missing += cosine;
+          break;
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] bool has_surface(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const auto reach = static_cast<float>(std::hypot(options_.distance_mm, options_.lateral_mm));
+    const KdTree::Neighbour nearest = scan_.foreground_tree.nearest(point.cast<float>(), reach);
+    if (!nearest.found()) return false;
+    const Eigen::Vector3d offset = scan_.foreground.cloud.positions[nearest.index].cast<double>() - point;
+    return std::abs(offset.dot(normal)) <= options_.distance_mm;
+  }
+
+  [[nodiscard]] bool is_behind_part(const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
+                                    const Eigen::Vector3d& towards_in_scan) const {
+    const double lift = 1e-3 * model_.diameter;
+    const Eigen::Vector3d start = point.cast<double>() + lift * normal.cast<double>();
+    const Eigen::Vector3d towards = scan_from_model_.linear().transpose() * towards_in_scan;
+    return model_.rays->is_blocked(start, towards, lift, 2.0 * model_.diameter);
+  }
+
+  Pose scan_from_model_;
+  const model::PreparedModel& model_;
+  const ScanEvidence& scan_;
+  const EvidenceOptions& options_;
+  Eigen::Vector3d centre_;
+  Eigen::Vector3d parallel_direction_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace
+
+ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background)
+    : scan(the_scan),
+      background(the_background),
+      foreground(without(the_scan, the_background)),
+      foreground_tree(foreground.cloud.positions) {
+  if (scan.viewpoint.known()) depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
+}
+
+double PoseEvidence::score() const {
+  return ratio(static_cast<double>(explained),
+               static_cast<double>(explained + contradicted + seen_through) + 0.5 * static_cast<double>(missing));
+}
+
+double PoseEvidence::weakest_direction() const {
+  if (explained_samples == 0) return 0.0;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information, Eigen::EigenvaluesOnly);
+  return std::max(0.0, solver.eigenvalues()[0]) / static_cast<double>(explained_samples);
+}
+
+double PoseEvidence::free_space_share() const { return ratio(seen_through, facing - hidden); }
+
+double PoseEvidence::visible_share() const {
+  return ratio(static_cast<double>(explained_anywhere), static_cast<double>(samples));
+}
+
+PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples, const model::PreparedModel& model,
+                          const ScanEvidence& scan, const EvidenceOptions& options) {
+  const Judge judge(model_from_scan, model, scan, options);
+  PoseEvidence sum;
+  for (std::size_t i = 0; i < samples.size(); ++i) judge.add(samples.positions[i], samples.normals[i], sum);
+  return sum;
+}
+
+double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                        double distance_mm, double max_angle, bool every_point) {
+  constexpr float kFlat = 0.02F;
+  const double min_cosine = std::cos(max_angle);
+  std::size_t on_model = 0, agreeing = 0;
+  for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
+    if (!every_point && scan.surface_variation[i] > kFlat) continue;
+    const Eigen::Vector3d point = model_from_scan * scan.cloud.positions[i].cast<double>();
+    const model::DistanceField::Sample sample = model.field->at(point.cast<float>());
+    if (!sample.known() || std::abs(sample.distance) > distance_mm) continue;
+    const Eigen::Vector3d model_normal = model.face_normals[static_cast<std::size_t>(sample.triangle)].cast<double>();
+    const double cosine = model_normal.dot(model_from_scan.linear() * scan.cloud.normals[i].cast<double>());
+    ++on_model;
+    agreeing += (scan.normals_oriented ? cosine : std::abs(cosine)) >= min_cosine ? 1 : 0;
+  }
+  return ratio(static_cast<double>(agreeing), static_cast<double>(on_model));
+}
+
+}  // namespace asbuilt::verify

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/point_cloud.h"
+#include "asbuilt/core/pose.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/scan/depth_image.h"
+#include "asbuilt/scan/scan.h"
+
+namespace asbuilt::verify {
+
+/// What a scan can be asked about a pose. Built once per scan, then const.
+struct ScanEvidence {
+  /// `background` marks points that cannot be the part's (planes larger than it); they hide and reveal, but never
+  /// confirm.
+  ScanEvidence(const scan::Scan& scan, const std::vector<std::uint8_t>& background);
+
+  const scan::Scan& scan;
+  std::vector<std::uint8_t> background;  ///< one a point of the scan
+  scan::Scan foreground;                 ///< the scan without them: points, normals, surface variation
+  KdTree foreground_tree;
+  std::optional<scan::DepthImage> depth;  ///< of all points, if the viewpoint is known
+};
+
+/// What became of the model samples that ought to be visible at a pose. Each counts with the cosine of its incidence,
+/// the area that it shows to the sensor: what is seen edge-on returns little and proves little.
+struct PoseEvidence {
+  std::size_t samples = 0;             ///< all model samples asked
+  std::size_t explained_anywhere = 0;  ///< of all samples, visible or not: Eq. 11 to the letter
+  std::size_t explained_samples = 0;   ///< of those that ought to be visible
+  double facing = 0.0;                 ///< turned to the sensor and not behind the part itself
+  double explained = 0.0;              ///< the scan has a surface there (Eq. 11's condition, across the surface)
+  double hidden = 0.0;                 ///< something stands in front: neutral
+  double contradicted = 0.0;           ///< the scan has a surface nearby, but not there
+  double seen_through = 0.0;           ///< the sensor measured something behind
+  double missing = 0.0;                ///< no return: weak evidence against
+  /// Of the explained samples' normals on a twist about the part's centre; rotations are measured by the motion that
+  /// they cause at half a diameter.
+  Matrix6d information = Matrix6d::Zero();
+
+  /// Smallest eigenvalue of the information per explained sample: 0 if the part can slide or turn without leaving the
+  /// surface that was found (a plane, a cylinder).
+  [[nodiscard]] double weakest_direction() const;
+
+  /// Xi over what should be visible and is not hidden; a missing return counts half.
+  [[nodiscard]] double score() const;
+  [[nodiscard]] double free_space_share() const;  ///< seen_through / (facing - hidden)
+  [[nodiscard]] double visible_share() const;     ///< Eq. 11 over all samples
+};
+
+struct EvidenceOptions {
+  double distance_mm = 1.0;  ///< tau_theta: across the surface
+  double lateral_mm = 1.0;   ///< how far along the surface the next measurement may be
+};
+
+/// Asks the scan about every one of `samples` (oriented, in the model frame).
+[[nodiscard]] PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples,
+                                        const model::PreparedModel& model, const ScanEvidence& scan,
+                                        const EvidenceOptions& options);
+
+/// Share of the scan points on the model (within `distance_mm`) whose normal agrees with the model's within
+/// `max_angle` radians; 0 when there are none. Signs count only where the scan knows them.
+/// Points on edges have no normal to speak of and are not asked (not so in paper mode: `every_point`).
+[[nodiscard]] double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan,
+                                      const model::PreparedModel& model, double distance_mm, double max_angle,
+                                      bool every_point);
+
+}  // namespace asbuilt::verify

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/lm_icp.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "asbuilt/core/robust.h"
+
+namespace asbuilt::verify {
+namespace {
+
+struct NormalEquations {
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0;
+  double squared = 0.0;
+  std::size_t inliers = 0;
+};
+
+class Problem {
+ public:
+  Problem(std::span<const Eigen::Vector3f> points, const model::PreparedModel& model, const scan::Viewpoint& viewpoint,
+          const LmIcpOptions& options)
+      : points_(points), model_(model), viewpoint_(viewpoint), options_(options), loss_{options.robust_scale_mm} {
+    pivot_ = model.box.center();
+  }
+
+  [[nodiscard]] const Eigen::Vector3d& pivot() const { return pivot_; }
+
+  // A point off the field costs as much as one beyond the robust scale: leaving must not pay.
+  [[nodiscard]] NormalEquations evaluate(const Pose& pose) const {
+    NormalEquations sum;
+    const double outlier_cost = loss_.value(loss_.scale * loss_.scale);
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const Eigen::Vector3f translation = pose.translation().cast<float>();
+    for (const Eigen::Vector3f& point : points_) {
+      const Eigen::Vector3f moved = rotation * point + translation;
+      const model::DistanceField::Sample sample = model_.field->at(moved);
+      if (!sample.known() || std::abs(sample.distance) >= loss_.scale || !faces_sensor(sample, pose, point)) {
+        sum.cost += outlier_cost;
+        continue;
+      }
+      const FieldResidual r = field_residual(sample, moved.cast<double>(), pivot_);
+      const double squared = r.value * r.value;
+      const double weight = loss_.weight(squared);
+      sum.information.selfadjointView<Eigen::Lower>().rankUpdate(r.derivative, weight);
+      sum.gradient += weight * r.value * r.derivative;
+      sum.cost += loss_.value(squared);
+      sum.squared += squared;
+      ++sum.inliers;
+    }
+    sum.information = sum.information.selfadjointView<Eigen::Lower>();
+    return sum;
+  }
+
+ private:
+  [[nodiscard]] bool faces_sensor(const model::DistanceField::Sample& sample, const Pose& pose,
+                                  const Eigen::Vector3f& point) const {
+    if (!options_.only_facing || !viewpoint_.known()) return true;
+    const Eigen::Vector3f& normal = model_.face_normals[static_cast<std::size_t>(sample.triangle)];
+    return normal.cast<double>().dot(pose.linear() * viewpoint_.towards_sensor(point.cast<double>())) > -0.1;
+  }
+
+  std::span<const Eigen::Vector3f> points_;
+  const model::PreparedModel& model_;
+  const scan::Viewpoint& viewpoint_;
+  const LmIcpOptions& options_;
+  TukeyLoss loss_;
+  Eigen::Vector3d pivot_;
+};
+
+Pose stepped(const Pose& pose, const Vector6d& step, const Eigen::Vector3d& pivot) {
+  return Eigen::Translation3d(pivot) * pose_from_twist(step) * Eigen::Translation3d(-pivot) * pose;
+}
+
+// Directions that nothing holds (sliding along a plane) get no step instead of a huge one.
+Vector6d damped_step(const NormalEquations& equations, double damping) {
+  Matrix6d system = equations.information;
+  const Vector6d diagonal = system.diagonal();
+  system.diagonal() += damping * diagonal + Vector6d::Constant(1e-9 * diagonal.maxCoeff() + 1e-12);
+  return -system.ldlt().solve(equations.gradient);
+}
+
+}  // namespace
+
+FieldResidual field_residual(const model::DistanceField::Sample& sample, const Eigen::Vector3d& point_in_model,
+                             const Eigen::Vector3d& pivot_in_model) {
+  const Eigen::Vector3d gradient = sample.gradient.cast<double>();
+  FieldResidual result;
+  result.value = static_cast<double>(sample.distance);
+  result.derivative << (point_in_model - pivot_in_model).cross(gradient), gradient;
+  return result;
+}
+
+LmIcpResult lm_icp(std::span<const Eigen::Vector3f> points_in_scan, const Pose& model_from_scan,
+                   const model::PreparedModel& model, const scan::Viewpoint& viewpoint, const LmIcpOptions& options) {
+  const Problem problem(points_in_scan, model, viewpoint, options);
+  const double lever = 0.5 * model.diameter;
+  LmIcpResult result;
+  result.model_from_scan = model_from_scan;
+  NormalEquations current = problem.evaluate(model_from_scan);
+  double damping = 1e-3;
+  for (result.iterations = 0; result.iterations < options.max_iterations; ++result.iterations) {
+    if (current.inliers < 6) break;
+    const Vector6d step = damped_step(current, damping);
+    const double motion = step.head<3>().norm() * lever + step.tail<3>().norm();
+    if (!step.allFinite()) break;
+    const Pose trial = stepped(result.model_from_scan, step, problem.pivot());
+    const NormalEquations next = problem.evaluate(trial);
+    if (next.cost < current.cost) {
+      result.model_from_scan = trial;
+      current = next;
+      damping = std::max(1e-7, 0.2 * damping);
+      if (motion < 1e-3 * options.robust_scale_mm) break;
+    } else {
+      damping *= 10.0;
+      if (damping > 1e4 || motion < 1e-4 * options.robust_scale_mm) break;
+    }
+  }
+  result.model_from_scan = orthonormalised(result.model_from_scan);
+  result.inliers = current.inliers;
+  result.rms_mm = current.inliers == 0 ? 0.0 : std::sqrt(current.squared / static_cast<double>(current.inliers));
+  return result;
+}
+
+}  // namespace asbuilt::verify

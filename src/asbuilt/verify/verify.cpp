@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/verify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "asbuilt/core/option_check.h"
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/detect/large_planes.h"
+#include "asbuilt/verify/evidence.h"
+#include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/segment.h"
+#include "asbuilt/verify/verdict.h"
+
+namespace asbuilt::verify {
+namespace {
+
+// Log odds: a contradiction is rare at a right pose and common at a wrong one; agreement is common at both.
+constexpr double kContradictionWeight = 3.0;
+
+constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
+
+/// One level of the coarse-to-fine pyramid (Sec. 3.1: three of them).
+struct Level {
+  double spacing_mm;                      ///< of the scan points used
+  std::array<double, 2> robust_scale_mm;  ///< of the two passes
+  double score_distance_mm;
+  std::size_t survivors;  ///< candidates that reach the next level
+  const PointCloud* model_samples;
+  double contradiction_weight;  ///< a right pose has few contradictions, once it is precise
+};
+
+double score_distance(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options) {
+  const double sensor = options.score_distance_mm > 0.0 ? options.score_distance_mm
+                                                        : std::max(3.0 * scan.noise_sigma_mm, 0.5 * scan.spacing_mm);
+  return options.paper_mode ? sensor : sensor + options.deviation_ratio * model.diameter;
+}
+
+// Floors, walls and tables larger than the part would lend their points to any flat face of it.
+std::vector<std::uint8_t> background(const scan::Scan& scan, const model::PreparedModel& model,
+                                     const VerifyOptions& options, const Context& context) {
+  if (options.paper_mode) return std::vector<std::uint8_t>(scan.cloud.size(), 0);
+  return detect::points_on_large_planes(scan, model.sampling_distance, detect::kLargestExtentRatio * model.diameter,
+                                        context);
+}
+
+std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
+  const double d = model.sampling_distance;
+  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 40, &model.samples, 1.0},
+           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 16, &model.samples, 2.0},
+           {0.3 * d,
+            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+            final_distance,
+            16,
+            &model.dense_samples,
+            kContradictionWeight}}};
+}
+
+// The scan points that may lie on the part at a pose.
+std::vector<Eigen::Vector3f> points_around(const std::vector<Eigen::Vector3f>& points, const Pose& model_from_scan,
+                                           const model::PreparedModel& model, double margin_mm) {
+  const Eigen::Vector3f centre = (model_from_scan.inverse() * model.box.center().eval()).cast<float>();
+  const auto radius = static_cast<float>(0.5 * model.diameter + margin_mm);
+  std::vector<Eigen::Vector3f> around;
+  for (const Eigen::Vector3f& point : points) {
+    if ((point - centre).squaredNorm() <= radius * radius) around.push_back(point);
+  }
+  return around;
+}
+
+std::vector<Eigen::Vector3f> level_points(const scan::Scan& scan, double spacing_mm, const Context& context) {
+  if (spacing_mm <= scan.spacing_mm) return scan.cloud.positions;
+  std::vector<Eigen::Vector3f> points;
+  for (const std::uint32_t i : even_subset(scan.cloud.positions, spacing_mm, context)) {
+    points.push_back(scan.cloud.positions[i]);
+  }
+  return points;
+}
+
+void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double contradiction_weight) {
+  candidate.score = evidence.score();
+  candidate.visible_share = evidence.visible_share();
+  candidate.free_space_violations = evidence.free_space_share();
+  candidate.hidden_share = evidence.facing > 0.0 ? evidence.hidden / evidence.facing : 0.0;
+  candidate.explained_samples = static_cast<int>(evidence.explained_samples);
+  candidate.weakest_direction = evidence.weakest_direction();
+  const double denied = evidence.contradicted + evidence.seen_through;
+  candidate.contradiction_share =
+      evidence.facing > evidence.hidden ? denied / (evidence.facing - evidence.hidden) : 0.0;
+  candidate.support = (evidence.explained - contradiction_weight * denied - 0.25 * evidence.missing) /
+                      static_cast<double>(evidence.samples);
+}
+
+class Verification {
+ public:
+  Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
+               const Context& context)
+      : scan_(scan),
+        model_(model),
+        options_(options),
+        context_(context),
+        evidence_(scan, background(scan, model, options, context)),
+        final_distance_(score_distance(scan, model, options)) {}
+
+  // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
+  [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates) const {
+    for (const Level& level : pyramid(model_, final_distance_)) {
+      const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
+      parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
+        if (!context_.cancelled()) refine_at(level, points, candidates[i]);
+      });
+      candidates = best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_);
+    }
+    return candidates;
+  }
+
+  // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
+  void register_densely(Candidate& candidate) const {
+    constexpr std::size_t kMostPoints = 30000;
+    std::vector<Eigen::Vector3f> around =
+        points_around(evidence_.foreground.cloud.positions, candidate.model_from_scan, model_, 0.05 * model_.diameter);
+    if (around.size() > kMostPoints) {
+      const std::size_t step = around.size() / kMostPoints + 1;
+      std::vector<Eigen::Vector3f> thinned;
+      for (std::size_t i = 0; i < around.size(); i += step) thinned.push_back(around[i]);
+      around = std::move(thinned);
+    }
+    for (const double scale : {1.5 * final_distance_, final_distance_}) {
+      const LmIcpResult result =
+          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 30, !options_.paper_mode});
+      candidate.model_from_scan = result.model_from_scan;
+      candidate.rms_mm = result.rms_mm;
+      candidate.residual_ratio = result.rms_mm / final_distance_;
+    }
+    judge(candidate, model_.dense_samples, final_distance_, kContradictionWeight);
+    candidate.normal_agreement =
+        normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
+                         options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
+  }
+
+  void cut_out(Detection& detection) const {
+    const SegmentOptions segmentation{std::max(final_distance_, 0.0075 * model_.diameter), 0.03 * model_.diameter, 0.8};
+    Segment segment = segment_part(detection.best.model_from_scan, model_, evidence_, segmentation, context_);
+    detection.segment = std::move(segment.part);
+    detection.margin_points = std::move(segment.margin);
+  }
+
+ private:
+  void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {
+    const std::vector<Eigen::Vector3f> around =
+        points_around(points, candidate.model_from_scan, model_, 2.0 * level.robust_scale_mm[0]);
+    for (const double scale : level.robust_scale_mm) {
+      candidate.model_from_scan =
+          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, !options_.paper_mode})
+              .model_from_scan;
+    }
+    judge(candidate, *level.model_samples, level.score_distance_mm, level.contradiction_weight);
+  }
+
+  void judge(Candidate& candidate, const PointCloud& samples, double distance_mm, double contradiction_weight) const {
+    // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
+    const double lateral = options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
+    take_evidence(candidate,
+                  evidence_for(candidate.model_from_scan, samples, model_, evidence_, {distance_mm, lateral}),
+                  contradiction_weight);
+    if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
+  }
+
+  const scan::Scan& scan_;
+  const model::PreparedModel& model_;
+  const VerifyOptions& options_;
+  const Context& context_;
+  ScanEvidence evidence_;
+  double final_distance_;
+};
+
+}  // namespace
+
+Result<void> VerifyOptions::validate() const {
+  ASBUILT_CHECK(expect_between("score_distance", score_distance_mm, 0.0, 1e6));
+  ASBUILT_CHECK(expect_between("deviation_ratio", deviation_ratio, 0.0, 0.1));
+  ASBUILT_CHECK(expect_between("acceptance_score", acceptance_score, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("min_normal_agreement", min_normal_agreement, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("min_explained_samples", min_explained_samples, 0, 1000000));
+  ASBUILT_CHECK(expect_between("min_margin", min_margin, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_free_space_share", max_free_space_share, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_residual_ratio", max_residual_ratio, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_contradiction_share", max_contradiction_share, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
+  ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
+  return {};
+}
+
+Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
+                         std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
+                         const Context& context, bool accept_anyway) {
+  ASBUILT_CHECK(options.validate());
+  std::vector<Candidate> candidates;
+  for (const detect::Hypothesis& hypothesis : hypotheses) {
+    Candidate candidate;
+    candidate.model_from_scan = hypothesis.model_from_scan;
+    candidate.votes = hypothesis.votes;
+    candidates.push_back(candidate);
+  }
+  const Verification verification(scan, model, options, context);
+  candidates = verification.coarse_to_fine(std::move(candidates));
+  parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
+    if (!context.cancelled()) verification.register_densely(candidates[i]);
+  });
+  if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
+
+  Detection detection = decide(std::move(candidates), model, options);
+  if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
+    detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
+    detection.status = Status::accepted;
+    detection.reason = Reason::none;
+  }
+  if (detection.status != Status::rejected) verification.cut_out(detection);
+  return detection;
+}
+
+}  // namespace asbuilt::verify

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/result.h"
+#include "asbuilt/detect/detect.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/scan/scan.h"
+#include "asbuilt/verify/detection.h"
+
+namespace asbuilt::verify {
+
+struct VerifyOptions {
+  double score_distance_mm = 0.0;  ///< tau_theta of Eq. 11; 0: from noise and spacing (architecture.md)
+  double deviation_ratio = 0.005;  ///< as-built deviation to be expected / diameter: added to score_distance
+  double acceptance_score = 0.7;   ///< Xi over the should-be-visible samples that a detection needs
+  double min_normal_agreement =
+      0.75;                        ///< share of the points on the model whose normals must agree (paper: a majority)
+  int min_explained_samples = 60;  ///< model samples that must be confirmed before anything is proved
+  double min_margin = 0.03;        ///< support by which the best pose must beat any different one
+  double max_free_space_share = 0.08;     ///< of should-be-visible samples seen through
+  double max_residual_ratio = 0.35;       ///< RMS of the points on the model / score distance (0.58: evenly strewn)
+  double max_contradiction_share = 0.08;  ///< of should-be-visible samples that the scan denies
+  double min_proof = 0.34;                ///< score * normal agreement * (1 - residual ratio / 0.58)
+  double hidden_surcharge =
+      0.35;  ///< added to min_proof per share of the part that other things hide: what hides can lie
+  double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction
+  double max_normal_angle_deg = 30.0;     ///< normals closer than this agree
+  bool paper_mode = false;
+
+  [[nodiscard]] Result<void> validate() const;
+
+  /// The published judge: Xi of Eq. 11 over all model samples, within 1.5 mm unless stated, a threshold, and a majority
+  /// of the normals. The paper names no threshold; ours lies below what its most hidden scans show.
+  [[nodiscard]] VerifyOptions as_published() const {
+    VerifyOptions published = *this;
+    published.paper_mode = true;
+    if (published.score_distance_mm == 0.0) published.score_distance_mm = 1.5;
+    published.acceptance_score = 0.12;
+    published.min_normal_agreement = 0.5;
+    published.min_explained_samples = 0;
+    return published;
+  }
+};
+
+template <class Visitor>
+void for_each_field(VerifyOptions& options, Visitor&& field) {
+  field("score_distance", options.score_distance_mm,
+        "distance that counts as on the model, mm (0: from noise and spacing)");
+  field("deviation_ratio", options.deviation_ratio, "as-built deviation to be expected / diameter");
+  field("acceptance_score", options.acceptance_score, "score that a detection needs");
+  field("min_normal_agreement", options.min_normal_agreement, "share of the normals that must agree");
+  field("min_explained_samples", options.min_explained_samples, "model samples that must be confirmed");
+  field("min_margin", options.min_margin, "support by which the best pose must beat any different one");
+  field("max_free_space_share", options.max_free_space_share,
+        "share of the claimed surface the sensor may see through");
+  field("max_residual_ratio", options.max_residual_ratio, "RMS of the points on the model / score distance");
+  field("max_contradiction_share", options.max_contradiction_share,
+        "share of the claimed surface that the scan may deny");
+  field("min_proof", options.min_proof, "score * normal agreement * fit that a detection needs");
+  field("hidden_surcharge", options.hidden_surcharge, "added to min_proof per share of the part that is hidden");
+  field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
+  field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
+}
+
+/// Judges hypotheses, best first: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part out.
+/// A pose that the user vouches for (`--accept`, `--poses`) enters as a hypothesis; `accept_anyway` skips the verdict
+/// for the best of them and says so in the explanation.
+[[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
+                                       std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
+                                       const Context& context, bool accept_anyway = false);
+
+}  // namespace asbuilt::verify

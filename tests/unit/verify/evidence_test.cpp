@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/evidence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "unit/verify/seen.h"
+
+namespace asbuilt::verify {
+namespace {
+
+const model::PreparedModel& block() {
+  static const model::PreparedModel model = test::prepared(test::stepped_block(), 0.03);
+  return model;
+}
+
+const Eigen::Vector3d kPlace(0, 0, 600);
+
+PoseEvidence judged(const scan::Scan& scan, const Pose& scan_from_model, const model::PreparedModel& model = block(),
+                    std::vector<std::uint8_t> background = {}) {
+  if (background.empty()) background.assign(scan.cloud.size(), 0);
+  const ScanEvidence evidence(scan, background);
+  return evidence_for(scan_from_model.inverse(), model.dense_samples, model, evidence,
+                      {0.5, std::max(0.5, 2.5 * scan.spacing_mm)});
+}
+
+TriangleMesh part_at(const Pose& scan_from_model) {
+  return simulate::transformed(test::stepped_block(), scan_from_model);
+}
+TriangleMesh wall() { return test::plate_at({2000, 2000, 10}, {0, 0, 1000}); }
+
+TEST(Evidence, OfTheTruePoseIsAllForIt) {
+  const Pose pose = test::pose_at(kPlace);
+  const PoseEvidence evidence = judged(test::seen({part_at(pose), wall()}), pose);
+  EXPECT_GT(evidence.score(), 0.97);
+  EXPECT_LT(evidence.free_space_share(), 0.005);
+  EXPECT_LT(evidence.contradicted, 0.01 * evidence.facing);
+  EXPECT_LT(evidence.hidden, 0.02 * evidence.facing);
+  EXPECT_EQ(evidence.samples, block().dense_samples.size());
+}
+
+TEST(Evidence, EverySampleThatOughtToBeSeenIsOfOneKind) {
+  const Pose pose = test::pose_at(kPlace), claimed = test::pose_at(kPlace + Eigen::Vector3d(30, 10, 5));
+  const PoseEvidence e = judged(test::seen({part_at(pose), wall()}), claimed);
+  EXPECT_NEAR(e.explained + e.hidden + e.contradicted + e.seen_through + e.missing, e.facing, 1e-9 * e.facing);
+  EXPECT_GE(e.explained_anywhere, e.explained_samples);
+}
+
+TEST(Evidence, HiddenIsNeutral) {
+  const Pose pose = test::pose_at(kPlace);
+  // A plate at two thirds of the way that covers everything to the right of the part's middle.
+  const Eigen::Vector3d middle = pose * Eigen::Vector3d(bounding_box(block().skin).center());
+  const TriangleMesh plate = test::plate_at({400, 400, 5}, {200.0 + middle.x() * 400.0 / middle.z(), 0, 400});
+  const PoseEvidence open = judged(test::seen({part_at(pose), wall()}), pose);
+  const PoseEvidence covered = judged(test::seen({part_at(pose), wall(), plate}), pose);
+  EXPECT_GT(covered.hidden, 0.3 * covered.facing);
+  EXPECT_LT(covered.hidden, 0.7 * covered.facing);
+  EXPECT_NEAR(covered.score(), open.score(), 0.03);
+  EXPECT_LT(covered.free_space_share(), 0.01);
+  EXPECT_LT(covered.visible_share(), 0.8 * open.visible_share()) << "Eq. 11 itself does count it";
+}
+
+TEST(Evidence, SeenThroughCountsAgainst) {
+  const Pose pose = test::pose_at(kPlace);
+  const PoseEvidence evidence = judged(test::seen({wall()}), pose);  // the part is not there at all
+  EXPECT_GT(evidence.free_space_share(), 0.97);
+  EXPECT_LT(evidence.score(), 0.01);
+}
+
+TEST(Evidence, NoReturnIsWeakerThanSeenThrough) {
+  const Pose pose = test::pose_at(kPlace);
+  const PoseEvidence nothing = judged(test::seen({test::plate_at({60, 60, 5}, {-120, 0, 800})}), pose);
+  EXPECT_GT(nothing.missing, 0.95 * nothing.facing);
+  const PoseEvidence through = judged(test::seen({wall()}), pose);
+  EXPECT_GT(through.seen_through, 0.95 * through.facing);
+  PoseEvidence half_missing, half_seen_through;
+  half_missing.explained = half_seen_through.explained = 1.0;
+  half_missing.missing = half_seen_through.seen_through = 1.0;
+  EXPECT_GT(half_missing.score(), half_seen_through.score());
+}
+
+TEST(Evidence, ASurfaceElsewhereContradicts) {
+  const Pose pose = test::pose_at(kPlace);
+  const Pose nearer = test::pose_at(kPlace - Eigen::Vector3d(0, 0, 1.8));  // between distance and lateral tolerance
+  const PoseEvidence evidence = judged(test::seen({part_at(pose), wall()}), nearer);
+  EXPECT_GT(evidence.contradicted, 0.5 * evidence.facing);
+}
+
+TEST(Evidence, BackgroundNeverConfirms) {
+  const Pose pose = test::pose_at(kPlace);
+  const scan::Scan scan = test::seen({part_at(pose), wall()});
+  // All but one point: a kd-tree of none is not asked here.
+  std::vector<std::uint8_t> background(scan.cloud.size(), 1);
+  background.front() = 0;
+  const PoseEvidence evidence = judged(scan, pose, block(), background);
+  EXPECT_EQ(evidence.explained, 0.0);
+  EXPECT_GT(evidence.contradicted, 0.9 * evidence.facing);
+}
+
+// A plate seen straight on shows a plane: two translations and one rotation are free.
+TEST(WeakestDirection, IsZeroOnAPlane) {
+  const TriangleMesh mesh = simulate::box({100, 80, 20});
+  const model::PreparedModel model = test::prepared(mesh, 0.04);
+  const Pose pose(Eigen::Translation3d(0, 0, 5000));
+  scan::Scan scan = test::seen({simulate::transformed(mesh, pose)}, 0.015, 0.0003);
+  const PoseEvidence evidence = judged(scan, pose, model);
+  ASSERT_GT(evidence.explained_samples, 100U);
+  EXPECT_LT(evidence.weakest_direction(), 1e-9);
+}
+
+// The side of a cylinder, ends out of sight: it can slide along its axis.
+TEST(WeakestDirection, IsZeroOnACylinder) {
+  const TriangleMesh mesh = simulate::cylinder(40.0, 150.0, 96);
+  const model::PreparedModel model = test::prepared(mesh, 0.04);
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation_from_axis_angle({0.5 * 3.14159265358979323846, 0, 0});
+  pose.translation() = Eigen::Vector3d(0, 0, 5000);
+  const scan::Scan scan = test::seen({simulate::transformed(mesh, pose)}, 0.02, 0.0004);
+  const PoseEvidence evidence = judged(scan, pose, model);
+  ASSERT_GT(evidence.explained_samples, 100U);
+  EXPECT_LT(evidence.weakest_direction(), 1e-9);
+}
+
+TEST(WeakestDirection, IsFirmWhereThreeSidesShow) {
+  const TriangleMesh mesh = simulate::box({100, 80, 60});
+  const Pose pose = test::pose_at(kPlace, {0.7, 0.6, 0.2});
+  const scan::Scan scan = test::seen({simulate::transformed(mesh, pose)});
+  EXPECT_GT(judged(scan, pose, test::prepared(mesh, 0.04)).weakest_direction(), 0.005);
+}
+
+TEST(WeakestDirection, OfNothingIsZero) { EXPECT_EQ(PoseEvidence{}.weakest_direction(), 0.0); }
+
+TEST(NormalAgreement, IsFullAtTheTruePoseAndNoneWhenFlipped) {
+  const Pose pose = test::pose_at(kPlace);
+  scan::Scan scan = test::seen({part_at(pose)});
+  EXPECT_GT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.97);
+  for (Eigen::Vector3f& normal : scan.cloud.normals) normal = -normal;
+  EXPECT_LT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.03);
+  scan.normals_oriented = false;  // then a sign means nothing
+  EXPECT_GT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.97);
+}
+
+TEST(NormalAgreement, WithoutPointsOnTheModelIsZero) {
+  const Pose pose = test::pose_at(kPlace);
+  EXPECT_EQ(normal_agreement(test::pose_at({900, 0, 0}), test::seen({part_at(pose)}), block(), 0.5, 0.5, false), 0.0);
+}
+
+}  // namespace
+}  // namespace asbuilt::verify

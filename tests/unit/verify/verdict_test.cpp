@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/verdict.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+#include <set>
+
+#include "support/matchers.h"
+#include "unit/verify/seen.h"
+
+namespace asbuilt::verify {
+namespace {
+
+const model::PreparedModel& block() {
+  static const model::PreparedModel model = test::prepared(test::stepped_block(), 0.05);
+  return model;
+}
+
+// One that nothing stands against.
+Candidate flawless(const Eigen::Vector3d& where = {0, 0, 600}) {
+  Candidate c;
+  c.model_from_scan = test::pose_at(where).inverse();
+  c.score = 0.95;
+  c.visible_share = 0.4;
+  c.normal_agreement = 0.95;
+  c.residual_ratio = 0.15;
+  c.rms_mm = 0.1;
+  c.support = 0.4;
+  c.weakest_direction = 0.05;
+  c.explained_samples = 500;
+  return c;
+}
+
+struct Flaw {
+  Reason reason;
+  std::function<void(Candidate&)> spoil;
+};
+
+TEST(Verdict, AcceptsACandidateThatNothingStandsAgainst) {
+  const Detection detection = decide({flawless()}, block(), {});
+  EXPECT_EQ(detection.status, Status::accepted);
+  EXPECT_EQ(detection.reason, Reason::none);
+  EXPECT_FALSE(detection.explanation.empty());
+}
+
+TEST(Verdict, GivesEachReasonToTheCandidateThatDeservesIt) {
+  const std::vector<Flaw> flaws{
+      {Reason::too_few_points, [](Candidate& c) { c.explained_samples = 5; }},
+      {Reason::low_score, [](Candidate& c) { c.score = 0.3; }},
+      {Reason::free_space_violated, [](Candidate& c) { c.free_space_violations = 0.3; }},
+      {Reason::poor_fit, [](Candidate& c) { c.residual_ratio = 0.55; }},
+      {Reason::contradicted, [](Candidate& c) { c.contradiction_share = 0.3; }},
+      {Reason::under_constrained, [](Candidate& c) { c.weakest_direction = 0.0; }},
+      {Reason::normals_disagree, [](Candidate& c) { c.normal_agreement = 0.4; }},
+      {Reason::weak_evidence,  // 0.75 * 0.78 * (1 - 0.34 / 0.577) = 0.24
+       [](Candidate& c) { c.score = 0.75, c.normal_agreement = 0.78, c.residual_ratio = 0.34; }}};
+  for (const Flaw& flaw : flaws) {
+    Candidate candidate = flawless();
+    flaw.spoil(candidate);
+    const Detection detection = decide({candidate}, block(), {});
+    EXPECT_EQ(detection.status, Status::rejected) << code_of(flaw.reason);
+    EXPECT_STREQ(code_of(detection.reason), code_of(flaw.reason));
+    EXPECT_THAT(detection.explanation, testing::ContainsRegex("[0-9]")) << "no numbers in the sentence";
+  }
+}
+
+TEST(Verdict, WithoutCandidatesIsNoHypothesis) {
+  const Detection detection = decide({}, block(), {});
+  EXPECT_EQ(detection.status, Status::rejected);
+  EXPECT_EQ(detection.reason, Reason::no_hypothesis);
+}
+
+TEST(Verdict, AsksForMoreProofWhereMoreIsHidden) {
+  Candidate candidate = flawless();
+  candidate.score = 0.8, candidate.normal_agreement = 0.85, candidate.residual_ratio = 0.2;  // proves 0.44
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.hidden_share = 0.6;  // 0.34 + 0.35 * 0.6 = 0.55
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+}
+
+TEST(Verdict, OnASecondInstanceIsAmbiguous) {
+  const Detection detection = decide({flawless(), flawless({300, 0, 600})}, block(), {});
+  EXPECT_EQ(detection.status, Status::ambiguous);
+  EXPECT_EQ(detection.reason, Reason::second_instance);
+  EXPECT_EQ(detection.candidates.size(), 2U);
+}
+
+TEST(Verdict, OnTwoPosesInOnePlaceIsAmbiguousIfTheyAreAboutEquallySupported) {
+  Candidate turned = flawless();
+  const Eigen::Translation3d centre(Eigen::Vector3d(bounding_box(block().skin).center()));
+  turned.model_from_scan = centre * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()) * centre.inverse() *
+                           turned.model_from_scan;
+  turned.support = 0.399;
+  const Detection detection = decide({flawless(), turned}, block(), {});
+  EXPECT_EQ(detection.status, Status::ambiguous);
+  EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
+  turned.support = 0.3;
+  EXPECT_EQ(decide({flawless(), turned}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, IsNotShakenByARivalThatWouldBeRejected) {
+  Candidate rival = flawless({300, 0, 600});
+  rival.free_space_violations = 0.5;
+  EXPECT_EQ(decide({flawless(), rival}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, CountsNearlyEqualPosesAsOne) {
+  Candidate again = flawless({0.5, 0, 600});
+  again.support = 0.39;
+  const Detection detection = decide({again, flawless()}, block(), {});
+  EXPECT_EQ(detection.status, Status::accepted);
+  EXPECT_EQ(detection.candidates.size(), 1U);
+  EXPECT_EQ(detection.best.support, 0.4) << "the best, in whatever order they come";
+  EXPECT_EQ(detection.margin, 0.4);
+}
+
+TEST(Verdict, InPaperModeLooksAtScoreAndNormalsAlone) {
+  VerifyOptions options;
+  options.paper_mode = true;
+  Candidate candidate = flawless();
+  candidate.free_space_violations = 0.5, candidate.contradiction_share = 0.5, candidate.weakest_direction = 0.0;
+  EXPECT_EQ(decide({candidate}, block(), options).status, Status::accepted);
+  candidate.normal_agreement = 0.3;
+  EXPECT_EQ(decide({candidate}, block(), options).reason, Reason::normals_disagree);
+}
+
+TEST(Reasons, HaveCodesThatAreAllDifferent) {
+  std::set<std::string> codes;
+  for (int reason = 0; reason <= static_cast<int>(Reason::wrong_unit); ++reason) {
+    codes.insert(code_of(static_cast<Reason>(reason)));
+  }
+  EXPECT_EQ(codes.size(), static_cast<std::size_t>(Reason::wrong_unit) + 1U);
+}
+
+TEST(Displacement, BoundsThatOfEveryVertex) {
+  const Pose a = test::pose_at({1, 2, 3}), b = test::pose_at({2, 2, 3}, {2.2, 0.6, 0.4});
+  const Pose b_from_a = b * a.inverse();
+  double largest = 0.0;
+  for (const Eigen::Vector3d& vertex : block().skin.vertices) {
+    largest = std::max(largest, (b_from_a * vertex - vertex).norm());
+  }
+  EXPECT_GE(displacement_mm(a, b, block()), largest - 1e-9);
+  EXPECT_LT(displacement_mm(a, a, block()), 1e-9);
+}
+
+}  // namespace
+}  // namespace asbuilt::verify
