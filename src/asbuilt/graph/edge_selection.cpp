@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/graph/edge_selection.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <tuple>
+
+#include "asbuilt/core/disjoint_sets.h"
+
+namespace asbuilt::graph {
+namespace {
+
+bool is_valid(const PairOverlap& pair, int scan_count) {
+  const bool scans_exist = 0 <= pair.first && pair.first < pair.second && pair.second < scan_count;
+  return scans_exist && 0.0 <= pair.overlap && pair.overlap <= 1.0;  // NaN fails here, as it should
+}
+
+Result<void> check(int scan_count, std::span<const PairOverlap> overlaps) {
+  for (const PairOverlap& pair : overlaps) {
+    if (is_valid(pair, scan_count)) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("overlap {} of scans {} and {} among {} scans is impossible",
+                                                         pair.overlap, pair.first, pair.second, scan_count));
+  }
+  std::vector<std::pair<int, int>> pairs;
+  for (const PairOverlap& pair : overlaps) pairs.emplace_back(pair.first, pair.second);
+  std::ranges::sort(pairs);
+  if (const auto twice = std::ranges::adjacent_find(pairs); twice != pairs.end()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("the overlap of scans {} and {} is given twice", twice->first, twice->second));
+  }
+  return {};
+}
+
+// Which of the strong pairs (a prefix of the ranking) stay under the cap. Those of the maximum spanning forest always
+// do, so the cap thins the graph but never cuts it.
+std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong, int max_degree) {
+  std::vector<bool> kept(strong.size(), max_degree == 0);
+  if (max_degree == 0) return kept;
+  DisjointSets forest(scan_count);
+  std::vector<int> degree(static_cast<std::size_t>(scan_count), 0);
+  const auto degree_of = [&](int scan) -> int& { return degree[static_cast<std::size_t>(scan)]; };
+  const auto keep = [&](std::size_t i) {
+    kept[i] = true;
+    ++degree_of(strong[i].first);
+    ++degree_of(strong[i].second);
+  };
+  for (std::size_t i = 0; i < strong.size(); ++i) {
+    if (forest.unite(strong[i].first, strong[i].second)) keep(i);
+  }
+  for (std::size_t i = 0; i < strong.size(); ++i) {
+    if (!kept[i] && degree_of(strong[i].first) < max_degree && degree_of(strong[i].second) < max_degree) keep(i);
+  }
+  return kept;
+}
+
+}  // namespace
+
+bool comes_before(const PairOverlap& a, const PairOverlap& b) {
+  return std::tuple(-a.overlap, a.first, a.second) < std::tuple(-b.overlap, b.first, b.second);
+}
+
+Result<void> EdgeSelectionOptions::validate() const {
+  if (!(0.0 <= low && low <= high && high <= 1.0)) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("overlap thresholds low = {} and high = {} must satisfy 0 <= low <= high <= 1", low, high));
+  }
+  if (max_degree < 0) {
+    return fail(ErrorCode::invalid_argument, fmt::format("max_degree = {} must not be negative", max_degree));
+  }
+  return {};
+}
+
+Result<EdgeSelection> select_edges(int scan_count, std::span<const PairOverlap> overlaps,
+                                   const EdgeSelectionOptions& options) {
+  ASBUILT_CHECK(options.validate());
+  ASBUILT_CHECK(check(scan_count, overlaps));
+
+  std::vector<PairOverlap> ranked(overlaps.begin(), overlaps.end());
+  std::ranges::sort(ranked, comes_before);
+  const auto strong_end = std::ranges::find_if(ranked, [&](const auto& pair) { return pair.overlap < options.high; });
+  const std::span<const PairOverlap> strong(ranked.begin(), strong_end);
+
+  EdgeSelection selection;
+  DisjointSets linked(scan_count);
+  const std::vector<bool> kept = under_cap(scan_count, strong, options.max_degree);
+  for (std::size_t i = 0; i < strong.size(); ++i) {
+    if (!kept[i]) continue;
+    linked.unite(strong[i].first, strong[i].second);
+    selection.edges.push_back(strong[i]);
+  }
+  for (const PairOverlap& pair : std::span<const PairOverlap>(strong_end, ranked.end())) {
+    const bool still_needed = linked.count() > 1 && pair.overlap >= options.low;
+    if (!still_needed) break;
+    const bool joins = linked.unite(pair.first, pair.second);
+    if (joins || !options.bridges_only) selection.edges.push_back(pair);
+  }
+  selection.components = linked.by_decreasing_size();
+  return selection;
+}
+
+}  // namespace asbuilt::graph

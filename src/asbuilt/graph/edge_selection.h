@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "asbuilt/core/result.h"
+
+namespace asbuilt::graph {
+
+/// One bar of the histogram of pairwise overlaps.
+struct PairOverlap {
+  int first = 0, second = 0;  ///< scan indices, first < second
+  double overlap = 0.0;       ///< shared voxels / voxels of the scan that has fewer, in [0, 1]
+
+  bool operator==(const PairOverlap&) const = default;
+};
+
+struct EdgeSelectionOptions {
+  double low = 0.10;         ///< alpha_l: a pair below it is never linked (our value; the paper gives none)
+  double high = 0.20;  ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
+  int max_degree = 0;        ///< strong links a scan keeps in dense networks, highest overlap first; 0: all of them
+  bool bridges_only = true;  ///< below `high` only a pair that joins two components; paper: any, until connected
+
+  [[nodiscard]] Result<void> validate() const;  ///< 0 <= low <= high <= 1, max_degree >= 0
+};
+
+template <class Visitor>
+void for_each_field(EdgeSelectionOptions& options, Visitor&& field) {
+  field("low", options.low, "overlap below which two scans are never linked");
+  field("high", options.high, "overlap from which they always are");
+  field("max_degree", options.max_degree, "links a scan keeps in a dense network (0: all)");
+}
+
+struct EdgeSelection {
+  std::vector<PairOverlap> edges;            ///< by decreasing overlap, ties by (first, second)
+  std::vector<std::vector<int>> components;  ///< largest first; `refine` works on the first
+};
+
+/// Decides which scans are registered to one another, by hysteresis on their overlap.
+///
+/// Pairs at or above `high` are linked at once. While the graph is still in pieces, further pairs follow in
+/// decreasing order, down to `low`: each that joins two components, or (paper: `bridges_only` off) each at all.
+/// Scans that stay alone form components of their own. With `max_degree`, a strong pair is left out when one of its
+/// scans has enough links already and the pair is not needed to connect: the components never depend on the cap.
+///
+/// Source: Sec. 3.2, Fig. 4 (c) and (d). Cost: O(P log P) for P pairs.
+/// Errors: invalid_argument if the options fail validate(), or a pair names an unknown scan, comes twice or has no
+/// overlap in [0, 1].
+[[nodiscard]] Result<EdgeSelection> select_edges(int scan_count, std::span<const PairOverlap> overlaps,
+                                                 const EdgeSelectionOptions& options = {});
+
+/// By decreasing overlap, ties by (first, second): a total order, so that it never matters how the input was ordered.
+[[nodiscard]] bool comes_before(const PairOverlap& a, const PairOverlap& b);
+
+}  // namespace asbuilt::graph

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/graph/edge_selection.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+namespace asbuilt::graph {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+TEST(EdgeSelection, WeakPairsAreUsedOnlyUntilTheGraphIsConnected) {
+  const std::vector<PairOverlap> overlaps{{0, 1, 0.8}, {1, 2, 0.2}, {0, 2, 0.15}};
+  const EdgeSelection selection = select_edges(3, overlaps).value();
+  EXPECT_THAT(selection.edges, ElementsAre(PairOverlap{0, 1, 0.8}, PairOverlap{1, 2, 0.2}));
+  EXPECT_THAT(selection.components, ElementsAre(ElementsAre(0, 1, 2)));
+}
+
+TEST(EdgeSelection, StrongPairsAreAllLinkedEvenWhenNoneIsNeeded) {
+  const std::vector<PairOverlap> overlaps{{0, 1, 0.8}, {0, 2, 0.7}, {1, 2, 0.35}};
+  EXPECT_EQ(select_edges(3, overlaps).value().edges.size(), 3U);
+}
+
+TEST(EdgeSelection, AWeakPairInsideAComponentIsTakenInPaperModeOnly) {
+  // 0-1-2 strong; 0-2 weak but stronger than 2-3, which alone connects scan 3.
+  const std::vector<PairOverlap> overlaps{{0, 1, 0.8}, {1, 2, 0.6}, {0, 2, 0.3}, {2, 3, 0.2}, {0, 3, 0.15}};
+  EdgeSelectionOptions ours;
+  ours.high = 0.35;
+  EdgeSelectionOptions paper = ours;
+  paper.bridges_only = false;
+  EXPECT_THAT(
+      select_edges(4, overlaps, paper).value().edges,
+      ElementsAre(PairOverlap{0, 1, 0.8}, PairOverlap{1, 2, 0.6}, PairOverlap{0, 2, 0.3}, PairOverlap{2, 3, 0.2}));
+  EXPECT_THAT(select_edges(4, overlaps, ours).value().edges,
+              ElementsAre(PairOverlap{0, 1, 0.8}, PairOverlap{1, 2, 0.6}, PairOverlap{2, 3, 0.2}));
+}
+
+TEST(EdgeSelection, ThresholdsThemselvesAreInclusive) {
+  const EdgeSelectionOptions options{0.2, 0.5, 0, true};
+  EXPECT_THAT(select_edges(2, std::vector<PairOverlap>{{0, 1, 0.2}}, options).value().edges, testing::SizeIs(1));
+  EXPECT_THAT(select_edges(2, std::vector<PairOverlap>{{0, 1, std::nextafter(0.2, 0.0)}}, options).value().edges,
+              IsEmpty());
+}
+
+TEST(EdgeSelection, ScansWithoutLinksFormComponentsOfTheirOwn) {
+  const std::vector<PairOverlap> overlaps{{1, 3, 0.9}, {0, 2, 0.05}};
+  const EdgeSelection selection = select_edges(4, overlaps).value();
+  EXPECT_THAT(selection.components, ElementsAre(ElementsAre(1, 3), ElementsAre(0), ElementsAre(2)));
+}
+
+TEST(EdgeSelection, NothingGivesNothing) {
+  const EdgeSelection selection = select_edges(0, {}).value();
+  EXPECT_THAT(selection.edges, IsEmpty());
+  EXPECT_THAT(selection.components, IsEmpty());
+}
+
+TEST(EdgeSelection, ImpossibleOverlapsAreRefusedWithTheirNumbers) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const PairOverlap& bad :
+       {PairOverlap{0, 1, 1.5}, PairOverlap{0, 1, -0.1}, PairOverlap{0, 1, nan}, PairOverlap{1, 0, 0.5},
+        PairOverlap{0, 0, 0.5}, PairOverlap{0, 3, 0.5}, PairOverlap{-1, 1, 0.5}}) {
+    const auto result = select_edges(3, std::vector<PairOverlap>{bad});
+    ASSERT_FALSE(result.has_value());
+    EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+    EXPECT_THAT(result.error().message, HasSubstr("among 3 scans"));
+  }
+  EXPECT_THAT(select_edges(3, std::vector<PairOverlap>{{0, 1, 0.5}, {0, 1, 0.4}}).error().message, HasSubstr("twice"));
+}
+
+TEST(EdgeSelection, OptionsOutOfOrderAreRefused) {
+  EXPECT_FALSE((EdgeSelectionOptions{0.5, 0.4, 0, true}).validate());
+  EXPECT_FALSE((EdgeSelectionOptions{-0.1, 0.4, 0, true}).validate());
+  EXPECT_FALSE((EdgeSelectionOptions{0.1, 1.1, 0, true}).validate());
+  EXPECT_FALSE((EdgeSelectionOptions{std::numeric_limits<double>::quiet_NaN(), 0.4, 0, true}).validate());
+  EXPECT_FALSE((EdgeSelectionOptions{0.1, 0.4, -1, true}).validate());
+  EXPECT_TRUE(EdgeSelectionOptions{}.validate());
+}
+
+}  // namespace
+}  // namespace asbuilt::graph
