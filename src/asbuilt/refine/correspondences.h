@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/pose.h"
+#include "asbuilt/refine/sampled_view.h"
+
+namespace asbuilt::refine {
+
+/// A point of the source view and the point of the target view that it was found to lie on.
+struct Match {
+  std::uint32_t source = 0, target = 0;
+  float weight = 1.0F;  ///< less where either point is doubtful
+};
+
+/// One entry A(h,k) of the paper: the points of `source` (h) against the planes of `target` (k).
+struct DirectedEdge {
+  int source = 0, target = 0;
+  double reach_mm = 0.0;       ///< longest match
+  double scale_mm = 0.0;       ///< robust scale of the residuals
+  double weight = 1.0;         ///< of every residual, from the variance of the edge
+  double normal_spread = 0.0;  ///< median sine between the normals of a match
+  std::vector<Match> matches;  ///< by increasing source
+};
+
+struct MatchRules {
+  bool coarse = false;        ///< only the thinned points of the source look for a match
+  bool check_normals = true;  ///< a match faces the same way
+  double min_cosine = 0.0;
+};
+
+/// Finds the closest point for every source point of every edge, in the target's own frame. Any number of threads
+/// finds the same. Stops early, with matches missing, when the context is cancelled.
+void find_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views, std::span<const Pose> poses,
+                  const MatchRules& rules, const Context& context);
+
+/// Robust statistics of an edge's matches: 1.4826 x median absolute residual, and median sine between normals.
+struct ResidualStatistics {
+  double scale_mm = 0.0;
+  double normal_spread = 0.0;
+};
+[[nodiscard]] ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const SampledView> views,
+                                                     std::span<const Pose> poses);
+
+}  // namespace asbuilt::refine

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/gauge.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/core/robust.h"
+#include "asbuilt/refine/sampled_view.h"
+
+namespace asbuilt::refine {
+namespace {
+
+constexpr std::size_t kPointsPerView = 6000, kPoints = 6000;
+constexpr double kReachRatio = 0.05;  // of the diameter
+constexpr double kTukeyTuning = 4.685;
+constexpr double kScaleDecay = 0.5;   // of the loss from step to step, at most
+constexpr double kSameSide = 0.3;     // cosine between scan normal and surface normal
+constexpr double kUnheld = 5e-4;      // information below this share of a full one moves nothing
+constexpr double kStillRatio = 1e-7;  // of the diameter: a step this small ends the search
+constexpr int kMaxSteps = 60;
+
+// Even over the union of all views, in the refined frame.
+PointCloud even_union(std::span<const View> views, std::span<const Pose> refined_from_scan, const Context& context) {
+  PointCloud all;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const PointCloud sample = evenly_sampled(views[v].segment_in_scan, kPointsPerView, context);
+    for (std::size_t i = 0; i < sample.size(); ++i) {
+      all.positions.push_back((refined_from_scan[v] * sample.positions[i].cast<double>()).cast<float>());
+      all.normals.push_back((refined_from_scan[v].linear() * sample.normals[i].cast<double>()).cast<float>());
+    }
+  }
+  return evenly_sampled(all, kPoints, context);
+}
+
+struct Residual {
+  bool used = false;
+  double distance = 0.0;                               // signed
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // moved
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  // of the signed distance
+};
+
+struct Sums {
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0, weight = 0.0;
+
+  Sums& operator+=(const Sums& other) {
+    information += other.information;
+    gradient += other.gradient;
+    cost += other.cost;
+    weight += other.weight;
+    return *this;
+  }
+};
+
+class GaugeFit {
+ public:
+  GaugeFit(const PointCloud& points, const model::SurfaceDistance& surface, double diameter, const Context& context)
+      : points_(points), surface_(surface), diameter_(diameter), context_(context) {
+    for (const Eigen::Vector3f& point : points.positions) centre_ += point.cast<double>();
+    centre_ /= static_cast<double>(points.size());
+    double squares = 0.0;
+    for (const Eigen::Vector3f& point : points.positions) squares += (point.cast<double>() - centre_).squaredNorm();
+    length_ = std::max(std::sqrt(squares / static_cast<double>(points.size())), 1e-9 * diameter);
+  }
+
+  Result<Pose> run() {
+    double scale = kReachRatio * diameter_;
+    double damping = 1e-6;
+    std::vector<Residual> residuals = residuals_at(pose_);
+    for (int iteration = 0; iteration < kMaxSteps; ++iteration) {
+      if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the fit to the CAD");
+      const double wanted = kTukeyTuning * std::max(spread(residuals), 1e-6 * diameter_);
+      const double next = std::max(wanted, kScaleDecay * scale);
+      const bool annealed = next > 0.95 * scale;
+      scale = std::min(scale, next);
+      const Sums sums = sums_of(residuals, scale);
+      if (!(sums.weight > 0.0)) {
+        return fail(ErrorCode::not_possible,
+                    fmt::format("no scanned point lies within {:.3g} mm of the CAD surface", kReachRatio * diameter_));
+      }
+      double motion = 0.0;
+      for (int attempt = 0; attempt < 8; ++attempt) {
+        const Vector6d step = held_step(sums, damping);
+        const Pose candidate = moved(step);
+        std::vector<Residual> there = residuals_at(candidate);
+        if (sums_of(there, scale).cost < sums.cost) {
+          motion = step.norm();
+          pose_ = candidate;
+          residuals = std::move(there);
+          damping = std::max(0.1 * damping, 1e-9);
+          break;
+        }
+        if (step.norm() < kStillRatio * diameter_) break;
+        damping = std::min(10.0 * damping, 1e6);
+      }
+      if (annealed && motion < kStillRatio * diameter_) break;
+    }
+    return pose_;
+  }
+
+ private:
+  [[nodiscard]] std::vector<Residual> residuals_at(const Pose& pose) const {
+    std::vector<Residual> residuals(points_.size());
+    parallel_for(context_, points_.size(), 256, [&](std::size_t i) {
+      const Eigen::Vector3d position = pose * points_.positions[i].cast<double>();
+      const Eigen::Vector3d normal = pose.linear() * points_.normals[i].cast<double>();
+      const auto nearest = surface_.nearest(position, kReachRatio * diameter_);
+      if (!nearest.found() || nearest.on_open_edge) return;
+      Residual& residual = residuals[i];
+      residual.position = position;
+      residual.distance = nearest.signed_distance;
+      // On the surface itself the direction to the nearest point has no digits left; the scan's normal stands in.
+      const bool has_direction = std::abs(nearest.signed_distance) > 1e-7 * diameter_;
+      residual.gradient = has_direction ? ((position - nearest.point) / nearest.signed_distance).eval() : normal;
+      residual.used = residual.gradient.dot(normal) > kSameSide;
+    });
+    return residuals;
+  }
+
+  [[nodiscard]] static double spread(const std::vector<Residual>& residuals) {
+    std::vector<double> distances;
+    for (const Residual& residual : residuals) {
+      if (residual.used) distances.push_back(std::abs(residual.distance));
+    }
+    if (distances.empty()) return 0.0;
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return 1.4826 * *middle;
+  }
+
+  // A point off reach or on the wrong side costs as much as one beyond the loss: losing points never looks like a gain.
+  [[nodiscard]] Sums sums_of(const std::vector<Residual>& residuals, double scale) const {
+    const TukeyLoss loss{scale};
+    return sum_in_fixed_order(context_, residuals.size(), 1024, Sums{}, [&](Sums& sums, std::size_t i) {
+      const Residual& residual = residuals[i];
+      if (!residual.used) {
+        sums.cost += loss.value(scale * scale);
+        return;
+      }
+      const double squared = residual.distance * residual.distance;
+      const double weight = loss.weight(squared);
+      Vector6d jacobian;
+      jacobian << (residual.position - centre_).cross(residual.gradient) / length_, residual.gradient;
+      sums.information += weight * jacobian * jacobian.transpose();
+      sums.gradient += weight * residual.distance * jacobian;
+      sums.cost += loss.value(squared);
+      sums.weight += weight;
+    });
+  }
+
+  [[nodiscard]] static Vector6d held_step(const Sums& sums, double damping) {
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(sums.information / sums.weight);
+    const Vector6d along = eigen.eigenvectors().transpose() * (sums.gradient / sums.weight);
+    Vector6d step = Vector6d::Zero();
+    for (int i = 0; i < 6; ++i) {
+      if (eigen.eigenvalues()[i] < kUnheld) continue;
+      step -= along[i] / (eigen.eigenvalues()[i] + damping) * eigen.eigenvectors().col(i);
+    }
+    return step;
+  }
+
+  [[nodiscard]] Pose moved(const Vector6d& scaled_step) const {
+    const Eigen::Matrix3d rotation = rotation_from_axis_angle(scaled_step.head<3>() / length_);
+    Pose pose = pose_;
+    pose.linear() = rotation * pose_.linear();
+    pose.translation() = rotation * (pose_.translation() - centre_) + centre_ + scaled_step.tail<3>();
+    return orthonormalised(pose);
+  }
+
+  const PointCloud& points_;
+  const model::SurfaceDistance& surface_;
+  double diameter_;
+  const Context& context_;
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  double length_ = 1.0;
+  Pose pose_ = Pose::Identity();
+};
+
+}  // namespace
+
+Result<Pose> best_fit_gauge(std::span<const View> views, std::span<const Pose> refined_from_scan,
+                            const model::SurfaceDistance& surface, double diameter_mm, const Context& context) {
+  if (views.size() != refined_from_scan.size()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("{} poses are given for {} views", refined_from_scan.size(), views.size()));
+  }
+  if (!(diameter_mm > 0.0 && std::isfinite(diameter_mm))) {
+    return fail(ErrorCode::invalid_argument, fmt::format("the diameter is {} mm", diameter_mm));
+  }
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (views[v].segment_in_scan.normals.size() != views[v].segment_in_scan.size()) {
+      return fail(ErrorCode::invalid_argument, fmt::format("view {} has not one normal a point", v));
+    }
+  }
+  const PointCloud points = even_union(views, refined_from_scan, context);
+  if (points.empty()) return fail(ErrorCode::not_possible, "there are no scanned points to fit to the CAD");
+  return GaugeFit(points, surface, diameter_mm, context).run();
+}
+
+}  // namespace asbuilt::refine

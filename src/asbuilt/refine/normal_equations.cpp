@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/normal_equations.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/core/robust.h"
+#include "asbuilt/refine/point_to_plane.h"
+
+namespace asbuilt::refine {
+namespace {
+
+constexpr std::size_t kBlock = 2048;
+constexpr double kTinyDamping = 1e-11;  // of the mean information: far below any real constraint, far above rounding
+constexpr int kDenseUnknowns = 600;     // up to a hundred views a dense factorisation is as quick
+
+struct Task {
+  std::size_t edge, begin, end;
+};
+
+std::vector<Task> blocks_of(std::span<const DirectedEdge> edges) {
+  std::vector<Task> tasks;
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const std::size_t count = edges[e].matches.size();
+    for (std::size_t i = 0; i < count; i += kBlock) tasks.push_back({e, i, std::min(count, i + kBlock)});
+  }
+  return tasks;
+}
+
+// The residual of a match, with positions relative to `origin` (which keeps the rotation columns small).
+class EdgeResidualFunction {
+ public:
+  EdgeResidualFunction(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
+                       const Eigen::Vector3d& origin, bool symmetric)
+      : source_(views[static_cast<std::size_t>(edge.source)].points),
+        target_(views[static_cast<std::size_t>(edge.target)].points),
+        source_pose_(poses[static_cast<std::size_t>(edge.source)]),
+        target_pose_(poses[static_cast<std::size_t>(edge.target)]),
+        origin_(origin),
+        symmetric_(symmetric) {}
+
+  [[nodiscard]] Eigen::Vector3d position(const Match& match) const {
+    return source_pose_ * source_.positions[match.source].cast<double>() - origin_;
+  }
+
+  [[nodiscard]] ResidualWithJacobian operator()(const Match& match) const {
+    const Eigen::Vector3d p = position(match);
+    const Eigen::Vector3d q = target_pose_ * target_.positions[match.target].cast<double>() - origin_;
+    const Eigen::Vector3d normal_q = target_pose_.linear() * target_.normals[match.target].cast<double>();
+    if (!symmetric_) return point_to_plane(p, q, normal_q);
+    const Eigen::Vector3d normal_p = source_pose_.linear() * source_.normals[match.source].cast<double>();
+    return symmetric_point_to_plane(p, normal_p, q, normal_q);
+  }
+
+ private:
+  const PointCloud& source_;
+  const PointCloud& target_;
+  const Pose& source_pose_;
+  const Pose& target_pose_;
+  Eigen::Vector3d origin_;
+  bool symmetric_;
+};
+
+}  // namespace
+
+EdgeSums& EdgeSums::operator+=(const EdgeSums& other) {
+  information += other.information;
+  gradient += other.gradient;
+  cost += other.cost;
+  weight += other.weight;
+  weighted_squares += other.weighted_squares;
+  weighted_position += other.weighted_position;
+  weighted_square_position += other.weighted_square_position;
+  return *this;
+}
+
+Matrix6d Scaling::twist_from_scaled() const {
+  // x -> x + w x (x - origin) + t  is the twist (w, t + origin x w).
+  Matrix6d result = Matrix6d::Identity();
+  result.topLeftCorner<3, 3>() /= length_mm;
+  result.bottomLeftCorner<3, 3>() = cross_matrix(origin) / length_mm;
+  return result;
+}
+
+std::vector<EdgeSums> linearise(std::span<const DirectedEdge> edges, std::span<const SampledView> views,
+                                std::span<const Pose> poses, const Scaling& scaling, bool symmetric,
+                                const Context& context) {
+  const std::vector<Task> tasks = blocks_of(edges);
+  std::vector<EdgeSums> partial(tasks.size());
+  parallel_for(context, tasks.size(), 1, [&](std::size_t t) {
+    const DirectedEdge& edge = edges[tasks[t].edge];
+    const EdgeResidualFunction residual_of(edge, views, poses, scaling.origin, symmetric);
+    const TukeyLoss loss{edge.scale_mm};
+    EdgeSums sums;
+    for (std::size_t i = tasks[t].begin; i < tasks[t].end; ++i) {
+      ResidualWithJacobian r = residual_of(edge.matches[i]);
+      r.jacobian.head<3>() /= scaling.length_mm;
+      const double squared = r.residual * r.residual;
+      const double match_weight = edge.weight * static_cast<double>(edge.matches[i].weight);
+      const double weight = match_weight * loss.weight(squared);
+      sums.cost += match_weight * loss.value(squared);
+      if (weight <= 0.0) continue;
+      sums.information.selfadjointView<Eigen::Lower>().rankUpdate(r.jacobian, weight);
+      sums.gradient += weight * r.residual * r.jacobian;
+      sums.weight += weight;
+      sums.weighted_squares += weight * squared;
+      const Eigen::Vector3d position = residual_of.position(edge.matches[i]);
+      sums.weighted_position += weight * position;
+      sums.weighted_square_position += weight * position.squaredNorm();
+    }
+    sums.information.triangularView<Eigen::StrictlyUpper>() = sums.information.transpose();
+    partial[t] = sums;
+  });
+  std::vector<EdgeSums> total(edges.size());
+  for (std::size_t t = 0; t < tasks.size(); ++t) total[tasks[t].edge] += partial[t];
+  return total;
+}
+
+double total_cost(std::span<const DirectedEdge> edges, std::span<const SampledView> views, std::span<const Pose> poses,
+                  bool symmetric, const Context& context) {
+  const std::vector<Task> tasks = blocks_of(edges);
+  return sum_in_fixed_order(context, tasks.size(), 1, 0.0, [&](double& sum, std::size_t t) {
+    const DirectedEdge& edge = edges[tasks[t].edge];
+    const EdgeResidualFunction residual_of(edge, views, poses, Eigen::Vector3d::Zero(), symmetric);
+    const TukeyLoss loss{edge.scale_mm};
+    for (std::size_t i = tasks[t].begin; i < tasks[t].end; ++i) {
+      const double residual = residual_of(edge.matches[i]).residual;
+      sum += edge.weight * static_cast<double>(edge.matches[i].weight) * loss.value(residual * residual);
+    }
+  });
+}
+
+LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling, double threshold) {
+  LinkBlock held = link;
+  held.information.setZero();
+  held.gradient.setZero();
+  if (!(both_ways.weight > 0.0)) return held;
+
+  const Eigen::Vector3d centre = both_ways.weighted_position / both_ways.weight;
+  const double variance = both_ways.weighted_square_position / both_ways.weight - centre.squaredNorm();
+  const double radius = std::sqrt(std::max(variance, 0.0));
+  if (!(radius > 1e-9 * scaling.length_mm)) return held;  // a single point holds nothing worth having
+
+  // Scaled twists about the overlap's own centre, in units of its own size.
+  Matrix6d scaled_from_local = Matrix6d::Identity();
+  scaled_from_local.topLeftCorner<3, 3>() *= scaling.length_mm / radius;
+  scaled_from_local.bottomLeftCorner<3, 3>() = cross_matrix(centre) / radius;
+  const Matrix6d local = scaled_from_local.transpose() * link.information * scaled_from_local / both_ways.weight;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(local);
+  if (eigen.eigenvalues()[0] >= threshold) return link;
+
+  Matrix6d projector = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i) {
+    if (eigen.eigenvalues()[i] < threshold) continue;
+    projector += eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose();
+  }
+  const Matrix6d local_from_scaled = scaled_from_local.inverse();
+  const Matrix6d kept =
+      scaled_from_local * projector * local_from_scaled;  // of twists; its transpose acts on gradients
+  held.gradient = kept.transpose() * link.gradient;
+  held.information = kept.transpose() * link.information * kept;
+  return held;
+}
+
+int NormalEquations::unknown_of(int view) const {
+  if (view == fixed_view_) return -1;
+  return 6 * (view < fixed_view_ ? view : view - 1);
+}
+
+NormalEquations::NormalEquations(int views, int fixed_view, std::span<const LinkBlock> links)
+    : views_(views), fixed_view_(fixed_view), links_(links.begin(), links.end()) {
+  gradient_ = Eigen::VectorXd::Zero(6 * (views - 1));
+  diagonal_ = Eigen::VectorXd::Zero(6 * (views - 1));
+  for (const LinkBlock& link : links_) {
+    const int a = unknown_of(link.first), b = unknown_of(link.second);
+    if (a >= 0) gradient_.segment<6>(a) += link.gradient;
+    if (b >= 0) gradient_.segment<6>(b) -= link.gradient;
+    if (a >= 0) diagonal_.segment<6>(a) += link.information.diagonal();
+    if (b >= 0) diagonal_.segment<6>(b) += link.information.diagonal();
+  }
+  mean_information_ = diagonal_.size() > 0 ? diagonal_.mean() : 0.0;
+}
+
+namespace {
+
+// Calls add(row, column, block) for each 6x6 block of the normal matrix, both triangles.
+template <class UnknownOf, class Add>
+void for_each_block(std::span<const LinkBlock> links, const UnknownOf& unknown_of, const Add& add) {
+  for (const LinkBlock& link : links) {
+    const int a = unknown_of(link.first), b = unknown_of(link.second);
+    if (a >= 0) add(a, a, link.information);
+    if (b >= 0) add(b, b, link.information);
+    if (a >= 0 && b >= 0) {
+      add(a, b, -link.information);
+      add(b, a, -link.information);
+    }
+  }
+}
+
+template <class UnknownOf>
+Eigen::MatrixXd dense_matrix(std::span<const LinkBlock> links, Eigen::Index size, const UnknownOf& unknown_of) {
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(size, size);
+  for_each_block(links, unknown_of,
+                 [&](int row, int column, const Matrix6d& block) { matrix.block<6, 6>(row, column) += block; });
+  return matrix;
+}
+
+template <class UnknownOf>
+Eigen::SparseMatrix<double> sparse_matrix(std::span<const LinkBlock> links, Eigen::Index size,
+                                          const UnknownOf& unknown_of) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for_each_block(links, unknown_of, [&](int row, int column, const Matrix6d& block) {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) entries.emplace_back(row + i, column + j, block(i, j));
+    }
+  });
+  Eigen::SparseMatrix<double> matrix(size, size);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+}  // namespace
+
+std::vector<Vector6d> NormalEquations::step(double damping, bool marquardt) const {
+  const Eigen::Index size = gradient_.size();
+  if (size == 0 || !(mean_information_ > 0.0)) return {};
+  const auto unknown = [this](int view) { return unknown_of(view); };
+  Eigen::VectorXd extra = Eigen::VectorXd::Constant(size, kTinyDamping * mean_information_);
+  if (marquardt) {
+    extra += damping * diagonal_;
+  } else {
+    extra.array() += damping * mean_information_;
+  }
+  Eigen::VectorXd solution;
+  if (size <= kDenseUnknowns) {
+    Eigen::MatrixXd matrix = dense_matrix(links_, size, unknown);
+    matrix.diagonal() += extra;
+    solution = matrix.ldlt().solve(-gradient_);
+  } else {
+    Eigen::SparseMatrix<double> matrix = sparse_matrix(links_, size, unknown);
+    matrix += Eigen::SparseMatrix<double>(extra.asDiagonal());
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(matrix);
+    if (solver.info() != Eigen::Success) return {};
+    solution = solver.solve(-gradient_);
+  }
+  if (!solution.allFinite()) return {};
+  std::vector<Vector6d> twists(static_cast<std::size_t>(views_), Vector6d::Zero());
+  for (int view = 0; view < views_; ++view) {
+    if (view != fixed_view_) twists[static_cast<std::size_t>(view)] = solution.segment<6>(unknown_of(view));
+  }
+  return twists;
+}
+
+template <class Solver>
+std::vector<Matrix6d> NormalEquations::blocks_with(const Solver& solver) const {
+  std::vector<Matrix6d> blocks(static_cast<std::size_t>(views_), Matrix6d::Zero());
+  for (int view = 0; view < views_; ++view) {
+    if (view == fixed_view_) continue;
+    const int at = unknown_of(view);
+    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(gradient_.size(), 6);
+    unit.block<6, 6>(at, 0).setIdentity();
+    const Eigen::MatrixXd columns = solver.solve(unit);
+    const Matrix6d block = columns.block<6, 6>(at, 0);
+    blocks[static_cast<std::size_t>(view)] = 0.5 * (block + block.transpose());
+  }
+  return blocks;
+}
+
+std::vector<Matrix6d> NormalEquations::inverse_blocks() const {
+  const Eigen::Index size = gradient_.size();
+  const auto unknown = [this](int view) { return unknown_of(view); };
+  const double tiny = mean_information_ > 0.0 ? kTinyDamping * mean_information_ : 1.0;
+  if (size <= kDenseUnknowns) {
+    Eigen::MatrixXd matrix = dense_matrix(links_, size, unknown);
+    matrix.diagonal().array() += tiny;
+    return blocks_with(Eigen::LDLT<Eigen::MatrixXd>(matrix));
+  }
+  Eigen::SparseMatrix<double> matrix = sparse_matrix(links_, size, unknown);
+  matrix += Eigen::SparseMatrix<double>(Eigen::VectorXd::Constant(size, tiny).asDiagonal());
+  return blocks_with(Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix));
+}
+
+double NormalEquations::unheld_variance() const {
+  return mean_information_ > 0.0 ? 1e-2 / (kTinyDamping * mean_information_) : 0.5;
+}
+
+}  // namespace asbuilt::refine

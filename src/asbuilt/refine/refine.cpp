@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/refine.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/refine/correspondences.h"
+#include "asbuilt/refine/normal_equations.h"
+#include "asbuilt/refine/sampled_view.h"
+
+namespace asbuilt::refine {
+namespace {
+
+constexpr double kTukeyTuning = 4.685;    // 95 % efficiency on normal residuals
+constexpr int kCoarsePoints = 2500;       // a view's points in the first steps, which only have to come near
+constexpr double kReachDecay = 0.7;       // an edge's reach never shrinks faster, lest a late view be left behind
+constexpr double kReachInScales = 8.0;    // and does not go below this many robust scales ...
+constexpr double kReachInSpacings = 2.5;  // ... or spacings of the target
+constexpr double kMaxScaleRatio = 3.0;    // one bad edge may not widen its own loss beyond this share of the others'
+constexpr double kMinWeight = 1e-3;       // of an edge whose residuals are wide, relative to a usual one
+constexpr double kCoarseMotion = 0.5;     // in units of noise: near enough for the full sample
+constexpr double kMinHeld = 1e-7, kMaxHeld = 5e-3;  // bounds of the rank threshold of an edge
+
+double squared(double x) { return x * x; }
+
+Result<void> check_view(const View& view, std::size_t index) {
+  const PointCloud& cloud = view.segment_in_scan;
+  if (cloud.empty()) return fail(ErrorCode::invalid_argument, fmt::format("view {} has no points", index));
+  if (cloud.normals.size() != cloud.size()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("view {} has {} normals for {} points", index, cloud.normals.size(), cloud.size()));
+  }
+  if (!is_rigid(view.model_from_scan.matrix())) {
+    return fail(ErrorCode::invalid_argument, fmt::format("the pose of view {} is not a rigid motion", index));
+  }
+  if (!(view.noise_sigma_mm >= 0.0 && std::isfinite(view.noise_sigma_mm))) {
+    return fail(ErrorCode::invalid_argument, fmt::format("noise of view {} is {} mm", index, view.noise_sigma_mm));
+  }
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.positions[i].allFinite() && cloud.normals[i].allFinite()) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("view {}: point {} is not finite", index, i));
+  }
+  return {};
+}
+
+// Links with first < second, in the order of the input, each once. The graph must hold together.
+Result<std::vector<Link>> check_links(std::span<const Link> links, int views) {
+  std::vector<Link> unique;
+  DisjointSets linked(views);
+  for (const Link& link : links) {
+    const bool exists = link.first >= 0 && link.second >= 0 && link.first < views && link.second < views;
+    if (!exists || link.first == link.second) {
+      return fail(ErrorCode::invalid_argument,
+                  fmt::format("link {} - {} among {} views is impossible", link.first, link.second, views));
+    }
+    const Link ordered{std::min(link.first, link.second), std::max(link.first, link.second)};
+    const bool known = std::ranges::any_of(
+        unique, [&](const Link& other) { return other.first == ordered.first && other.second == ordered.second; });
+    if (!known) unique.push_back(ordered);
+    linked.unite(link.first, link.second);
+  }
+  if (linked.count() > 1) {
+    return fail(
+        ErrorCode::not_possible,
+        fmt::format("the links leave {} views in {} pieces, a joint refinement needs one", views, linked.count()));
+  }
+  return unique;
+}
+
+int view_with_most_points(std::span<const View> views) {
+  const auto most = std::ranges::max_element(
+      views, {}, [](const View& view) { return view.segment_in_scan.size(); });  // the first of equals
+  return static_cast<int>(most - views.begin());
+}
+
+double median_of(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// The refinement of one component; the functions below are its steps in the order in which they happen.
+class JointRefinement {
+ public:
+  JointRefinement(std::span<const View> views, std::vector<Link> links, const RefineOptions& options,
+                  const Context& context)
+      : options_(options), context_(context), links_(std::move(links)), fixed_(view_with_most_points(views)) {
+    sample(views);
+    for (const View& view : views) poses_.push_back(view.model_from_scan);
+    measure();
+    make_edges();
+  }
+
+  Result<Refinement> run() {
+    Refinement result;
+    result.fixed_view = fixed_;
+    if (!edges_.empty()) ASBUILT_CHECK(descend(result));
+    if (!edges_.empty()) ASBUILT_CHECK(conclude(result));
+    result.converged = edges_.empty() || result.converged;
+    if (result.covariance.empty()) result.covariance.assign(poses_.size(), Matrix6d::Zero());
+    result.model_from_scan = poses_;
+    return result;
+  }
+
+ private:
+  enum class Outcome { improved, settled };
+
+  void sample(std::span<const View> views) {
+    const auto points = static_cast<std::size_t>(options_.points_per_scan);
+    for (const View& view : views) {
+      views_.push_back(sampled_view(view.segment_in_scan, view.noise_sigma_mm, points, kCoarsePoints,
+                                    !options_.paper_mode, context_));
+    }
+  }
+
+  // Origin and length that make rotations and translations comparable, and the diameter of all views together.
+  void measure() {
+    Eigen::AlignedBox3d box;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      centre += poses_[v] * views_[v].centroid;
+      for (const Eigen::Vector3f& point : views_[v].points.positions) box.extend(poses_[v] * point.cast<double>());
+    }
+    scaling_.origin = centre / static_cast<double>(views_.size());
+    diameter_ = box.diagonal().norm();
+    double squares = 0.0;
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      squares += squared(views_[v].radius_mm) + (poses_[v] * views_[v].centroid - scaling_.origin).squaredNorm();
+    }
+    scaling_.length_mm = std::sqrt(squares / static_cast<double>(views_.size()));
+    if (!(scaling_.length_mm > 0.0)) scaling_.length_mm = 1.0;
+  }
+
+  void make_edges() {
+    for (const Link& link : links_) {
+      for (const auto& [from, to] : {std::pair(link.first, link.second), std::pair(link.second, link.first)}) {
+        DirectedEdge edge;
+        edge.source = from;
+        edge.target = to;
+        edge.reach_mm = start_reach();
+        edges_.push_back(edge);
+      }
+    }
+  }
+
+  [[nodiscard]] double start_reach() const { return options_.start_distance_ratio * diameter_; }
+
+  [[nodiscard]] const SampledView& target(const DirectedEdge& edge) const {
+    return views_[static_cast<std::size_t>(edge.target)];
+  }
+
+  [[nodiscard]] double noise_of(const DirectedEdge& edge) const {
+    return std::hypot(views_[static_cast<std::size_t>(edge.source)].noise_sigma_mm, target(edge).noise_sigma_mm);
+  }
+
+  // Below this a residual is as good as zero, whatever its median says.
+  [[nodiscard]] double scale_floor(const DirectedEdge& edge) const {
+    return std::max({0.5 * noise_of(edge), 0.01 * target(edge).spacing_mm, 1e-7 * diameter_});
+  }
+
+  [[nodiscard]] MatchRules rules(bool coarse) const {
+    const double degrees = std::numbers::pi / 180.0;
+    return {coarse, !options_.paper_mode, std::cos(options_.max_normal_angle_deg * degrees)};
+  }
+
+  void match_and_scale(bool coarse, bool first) {
+    find_matches(edges_, views_, poses_, rules(coarse), context_);
+    if (options_.paper_mode && !first) return;  // the published loss has one fixed scale
+    std::vector<ResidualStatistics> statistics(edges_.size());
+    parallel_for(context_, edges_.size(), 1,
+                 [&](std::size_t e) { statistics[e] = residual_statistics(edges_[e], views_, poses_); });
+    std::vector<double> scales;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      if (!edges_[e].matches.empty()) scales.push_back(std::max(statistics[e].scale_mm, scale_floor(edges_[e])));
+    }
+    usual_scale_ = median_of(scales);
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      const double own = std::max(statistics[e].scale_mm, scale_floor(edges_[e]));
+      const double scale = options_.paper_mode ? usual_scale_ : std::min(own, kMaxScaleRatio * usual_scale_);
+      edges_[e].scale_mm = kTukeyTuning * scale;
+      edges_[e].normal_spread = statistics[e].normal_spread;
+      // Each edge counts by its own variance: precise scanners lead, and a view that stands wrong cannot bend the rest.
+      const double ratio = squared(usual_scale_ / own);
+      edges_[e].weight = options_.paper_mode ? 1.0 : std::clamp(ratio, kMinWeight, 1.0 / kMinWeight);
+    }
+  }
+
+  // From the misalignment to the noise: the reach follows the residuals down, edge by edge.
+  void shrink_reach() {
+    if (options_.paper_mode) return;
+    for (DirectedEdge& edge : edges_) {
+      const double wanted =
+          std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
+      edge.reach_mm = std::min(edge.reach_mm, std::max(wanted, kReachDecay * edge.reach_mm));
+    }
+  }
+
+  [[nodiscard]] bool reach_is_settled() const {
+    return options_.paper_mode || std::ranges::all_of(edges_, [&](const DirectedEdge& edge) {
+             const double wanted =
+                 std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
+             return edge.reach_mm <= 1.2 * wanted;
+           });
+  }
+
+  // Variance of a residual of weight one: the weights of the edges are in the normal matrix and so do not belong here.
+  [[nodiscard]] double unit_variance(std::span<const EdgeSums> sums) const {
+    double squares = 0.0, count = 0.0;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      squares += sums[e].weighted_squares;
+      count += sums[e].weight / edges_[e].weight;
+    }
+    return count > 0.0 ? squares / count : 0.0;
+  }
+
+  // Root mean squared residual of all matches, each as its robust loss weights it, every edge alike.
+  [[nodiscard]] double pooled_rms(std::span<const EdgeSums> sums) const {
+    double squares = 0.0, count = 0.0;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      squares += sums[e].weighted_squares / edges_[e].weight;
+      count += sums[e].weight / edges_[e].weight;
+    }
+    return count > 0.0 ? std::sqrt(squares / count) : 0.0;
+  }
+
+  [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums) const {
+    std::vector<LinkBlock> blocks;
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const EdgeSums &there = sums[2 * l], &back = sums[2 * l + 1];
+      EdgeSums both = there;
+      both += back;
+      const LinkBlock block{links_[l].first, links_[l].second, both.information, there.gradient - back.gradient,
+                            both.weight};
+      const double spread = std::max(edges_[2 * l].normal_spread, edges_[2 * l + 1].normal_spread);
+      const double threshold = std::clamp(2.0 * squared(spread), kMinHeld, kMaxHeld);
+      blocks.push_back(options_.paper_mode ? block : held_part(block, both, scaling_, threshold));
+    }
+    return {static_cast<int>(views_.size()), fixed_, blocks};
+  }
+
+  [[nodiscard]] std::vector<Pose> moved(std::span<const Vector6d> scaled_step) const {
+    std::vector<Pose> result = poses_;
+    for (std::size_t v = 0; v < poses_.size(); ++v) {
+      if (static_cast<int>(v) == fixed_) continue;  // exactly where it was, not almost
+      // Rotate about the origin of the scaling: with large coordinates, x -> R x + t about zero would lose digits.
+      const Vector6d& s = scaled_step[v];
+      const Eigen::Matrix3d rotation = rotation_from_axis_angle(s.head<3>() / scaling_.length_mm);
+      Pose pose = poses_[v];
+      pose.linear() = rotation * pose.linear();
+      pose.translation() = rotation * (pose.translation() - scaling_.origin) + scaling_.origin + s.tail<3>();
+      result[v] = orthonormalised(pose);
+    }
+    return result;
+  }
+
+  // Root mean squared motion (an upper bound) of the points of the view that moves most.
+  [[nodiscard]] double largest_motion(std::span<const Vector6d> scaled_step) const {
+    double largest = 0.0;
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      const Eigen::Vector3d w = scaled_step[v].head<3>() / scaling_.length_mm;
+      const Eigen::Vector3d at_centre =
+          w.cross(poses_[v] * views_[v].centroid - scaling_.origin) + scaled_step[v].tail<3>();
+      largest = std::max(largest, std::hypot(at_centre.norm(), w.norm() * views_[v].radius_mm));
+    }
+    return largest;
+  }
+
+  // One Levenberg-Marquardt step for the current matches; `motion` is what it moved.
+  Outcome take_step(const NormalEquations& equations, double cost, double& motion) {
+    motion = 0.0;
+    for (int attempt = 0; attempt < 8; ++attempt) {
+      const std::vector<Vector6d> step = equations.step(damping_, options_.paper_mode);
+      if (!step.empty()) {
+        const std::vector<Pose> candidate = moved(step);
+        if (total_cost(edges_, views_, candidate, options_.symmetric, context_) < cost) {
+          motion = largest_motion(step);
+          poses_ = candidate;
+          damping_ = std::max(0.1 * damping_, 1e-9);
+          return Outcome::improved;
+        }
+      }
+      damping_ = std::min(10.0 * damping_, 1e3);
+    }
+    return Outcome::settled;
+  }
+
+  Result<void> descend(Refinement& result) {
+    const bool has_coarse = !options_.paper_mode && std::ranges::any_of(views_, [](const SampledView& view) {
+      return view.points.size() > 2 * view.coarse.size();
+    });
+    damping_ = options_.paper_mode ? 1e-3 : 1e-6;
+    bool coarse = has_coarse;
+    for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+      match_and_scale(coarse, iteration == 0);
+      if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
+      const std::vector<EdgeSums> sums = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
+      EdgeSums total;
+      for (const EdgeSums& sum : sums) total += sum;
+      if (!(total.weight > 0.0)) {
+        return fail(
+            ErrorCode::not_possible,
+            fmt::format("no point of any view finds a counterpart within {:.3g} mm in a linked view", start_reach()));
+      }
+      if (iteration == 0) result.rms_before_mm = pooled_rms(sums);
+      double motion = 0.0;
+      const Outcome outcome = take_step(normal_equations(sums), total.cost, motion);
+      result.iterations = iteration + 1;
+      context_.report_progress(static_cast<double>(iteration + 1) / static_cast<double>(options_.max_iterations + 1));
+
+      const bool settled = reach_is_settled();
+      shrink_reach();
+      if (outcome == Outcome::settled) damping_ = 1e-6;
+      const bool quiet =
+          outcome == Outcome::settled || motion < (coarse ? kCoarseMotion : options_.converged_motion) * usual_scale_;
+      if (!settled || !quiet) continue;
+      if (!coarse) {
+        result.converged = true;
+        break;
+      }
+      coarse = false;
+    }
+    return {};
+  }
+
+  // Everything that is said about the final poses.
+  Result<void> conclude(Refinement& result) {
+    find_matches(edges_, views_, poses_, rules(false), context_);
+    const std::vector<EdgeSums> sums = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
+    if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
+    result.rms_after_mm = pooled_rms(sums);
+    describe_edges(sums, result);
+    // A doubtful match is biased rather than noisy: its small weight would make the pose look as if nothing held it.
+    for (DirectedEdge& edge : edges_) {
+      for (Match& match : edge.matches) match.weight = 1.0F;
+    }
+    const std::vector<EdgeSums> plain = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
+    describe_uncertainty(normal_equations(plain), plain, unit_variance(plain), result);
+    return {};
+  }
+
+  void describe_uncertainty(const NormalEquations& equations, std::span<const EdgeSums> sums, double variance,
+                            Refinement& result) const {
+    const std::vector<Matrix6d> inverse = equations.inverse_blocks();
+    const Matrix6d twist_from_scaled = scaling_.twist_from_scaled();
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      if (static_cast<int>(v) == fixed_) {
+        result.covariance.push_back(Matrix6d::Zero());
+        continue;
+      }
+      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(inverse[v]);
+      Vector6d variances = Vector6d::Zero();
+      for (int i = 0; i < 6; ++i) {
+        const bool unheld = eigen.eigenvalues()[i] > equations.unheld_variance();
+        const double unknown = squared(diameter_);
+        variances[i] = unheld ? unknown : std::min(unknown, std::max(0.0, variance * eigen.eigenvalues()[i]));
+        if (unheld) result.unheld.push_back(unheld_direction(static_cast<int>(v), eigen.eigenvectors().col(i), sums));
+      }
+      const Matrix6d scaled = eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose();
+      result.covariance.push_back(twist_from_scaled * scaled * twist_from_scaled.transpose());
+    }
+  }
+
+  [[nodiscard]] UnheldDirection unheld_direction(int view, Vector6d scaled, std::span<const EdgeSums> sums) const {
+    Eigen::Index largest = 0;
+    scaled.cwiseAbs().maxCoeff(&largest);
+    if (scaled[largest] < 0.0) scaled = -scaled;
+    double information = 0.0, weight = 0.0;
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      if (edges_[e].source != view && edges_[e].target != view) continue;
+      information += scaled.dot(sums[e].information * scaled);
+      weight += sums[e].weight;
+    }
+    std::vector<Vector6d> step(views_.size(), Vector6d::Zero());
+    step[static_cast<std::size_t>(view)] = scaled;
+    const double moves = largest_motion(step);
+    UnheldDirection direction;
+    direction.view = view;
+    direction.twist = scaling_.twist_from_scaled() * scaled / (moves > 0.0 ? moves : 1.0);
+    direction.eigenvalue = weight > 0.0 ? information / weight : 0.0;
+    return direction;
+  }
+
+  void describe_edges(std::span<const EdgeSums> sums, Refinement& result) {
+    std::vector<DirectedEdge> wide = edges_;
+    for (DirectedEdge& edge : wide) edge.reach_mm = start_reach();
+    MatchRules wide_rules = rules(true);
+    wide_rules.check_normals = true;
+    find_matches(wide, views_, poses_, wide_rules, context_);
+    for (std::size_t e = 0; e < edges_.size(); ++e) {
+      EdgeResidual residual;
+      residual.first = edges_[e].source;
+      residual.second = edges_[e].target;
+      residual.pairs = edges_[e].matches.size();
+      residual.rms_mm = sums[e].weight > 0.0 ? std::sqrt(sums[e].weighted_squares / sums[e].weight) : 0.0;
+      residual.candidates = wide[e].matches.size();
+      residual.spread_mm = residual_statistics(wide[e], views_, poses_).scale_mm;
+      result.edges.push_back(residual);
+    }
+  }
+
+  const RefineOptions& options_;
+  const Context& context_;
+  std::vector<Link> links_;
+  int fixed_;
+  std::vector<SampledView> views_;
+  std::vector<Pose> poses_;
+  std::vector<DirectedEdge> edges_;  // two per link
+  Scaling scaling_;
+  double diameter_ = 0.0;
+  double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
+  double damping_ = 0.0;
+};
+
+}  // namespace
+
+Result<void> RefineOptions::validate() const {
+  const auto bad = [](const char* name, double value, const char* range) {
+    return fail(ErrorCode::invalid_argument, fmt::format("{} = {} must be {}", name, value, range));
+  };
+  if (points_per_scan < 100) return bad("points_per_scan", points_per_scan, "at least 100");
+  if (max_iterations < 1) return bad("max_iterations", max_iterations, "at least 1");
+  if (!(max_normal_angle_deg > 0.0 && max_normal_angle_deg <= 90.0)) {
+    return bad("max_normal_angle_deg", max_normal_angle_deg, "in (0, 90]");
+  }
+  if (!(start_distance_ratio > 0.0 && start_distance_ratio <= 1.0)) {
+    return bad("start_distance_ratio", start_distance_ratio, "in (0, 1]");
+  }
+  if (!(converged_motion > 0.0 && std::isfinite(converged_motion))) {
+    return bad("converged_motion", converged_motion, "positive");
+  }
+  return {};
+}
+
+Result<Refinement> refine(std::span<const View> views, std::span<const Link> links, const RefineOptions& options,
+                          const Context& context) {
+  ASBUILT_CHECK(options.validate());
+  if (views.empty()) return fail(ErrorCode::invalid_argument, "there are no views to refine");
+  for (std::size_t i = 0; i < views.size(); ++i) ASBUILT_CHECK(check_view(views[i], i));
+  ASBUILT_TRY(unique_links, check_links(links, static_cast<int>(views.size())));
+  return JointRefinement(views, std::move(unique_links), options, context).run();
+}
+
+}  // namespace asbuilt::refine

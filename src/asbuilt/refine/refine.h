@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/point_cloud.h"
+#include "asbuilt/core/pose.h"
+#include "asbuilt/core/result.h"
+
+namespace asbuilt::refine {
+
+/// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
+struct View {
+  PointCloud segment_in_scan;
+  Pose model_from_scan = Pose::Identity();
+  double noise_sigma_mm = 0.0;  ///< 0: unknown
+};
+
+/// Undirected link; both directions enter Eq. 5.
+struct Link {
+  int first = 0, second = 0;
+};
+
+struct RefineOptions {
+  int points_per_scan = 25000;         ///< paper: 20-30 k, evenly spread
+  int max_iterations = 60;             ///< LM steps
+  double max_normal_angle_deg = 45.0;  ///< correspondences whose normals differ by more are dropped (ours)
+  double start_distance_ratio = 0.04;  ///< farthest correspondence of the first step / diameter of the views (ours)
+  double converged_motion = 0.02;      ///< stop when no view moves by more than this, in units of the residual noise
+  bool symmetric = false;              ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
+  bool paper_mode = false;             ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
+
+  [[nodiscard]] Result<void> validate() const;
+};
+
+template <class Visitor>
+void for_each_field(RefineOptions& options, Visitor&& field) {
+  field("points_per_scan", options.points_per_scan, "evenly spread points of each scan in the joint refinement");
+  field("max_iterations", options.max_iterations, "steps of the joint refinement");
+  field("max_normal_angle_deg", options.max_normal_angle_deg,
+        "correspondences whose normals differ by more are dropped");
+  field("start_distance_ratio", options.start_distance_ratio,
+        "farthest correspondence at the start / diameter of all views together");
+  field("converged_motion", options.converged_motion, "motion below which it stops, in units of the residual noise");
+  field("symmetric", options.symmetric, "symmetric point-to-plane residuals");
+}
+
+/// What one directed edge of the graph says at the end.
+struct EdgeResidual {
+  int first = 0, second = 0;   ///< from `first`'s points to `second`'s planes (directed)
+  std::size_t pairs = 0;       ///< accepted correspondences
+  double rms_mm = 0.0;         ///< of their point-to-plane residuals, as the robust loss weights them
+  std::size_t candidates = 0;  ///< points of `first` (a thinned sample) with a counterpart within the starting distance
+  double spread_mm = 0.0;      ///< 1.4826 x median absolute residual of the candidates: what a wrong view cannot hide
+};
+
+/// A motion of one view (against the fixed one) that the data do not determine.
+struct UnheldDirection {
+  int view = 0;
+  Vector6d twist =
+      Vector6d::Zero();  ///< rotation (rad) then translation (mm), on the left; moves the view's points by 1 mm (rms)
+  double eigenvalue = 0.0;  ///< information along it, relative to a direction that every pair holds fully
+};
+
+struct Refinement {
+  int fixed_view = 0;                 ///< the view with most points on the model
+  std::vector<Pose> model_from_scan;  ///< one a view; the fixed view keeps its start
+  /// Of the twist (rotation rad, translation mm) applied on the left; zero for the fixed one. From the inverse normal
+  /// matrix and the residual variance, as if correspondences were independent: they are not, so it is a lower bound.
+  /// Along an unheld direction the standard deviation is one diameter of the views: "unknown".
+  std::vector<Matrix6d> covariance;
+  int iterations = 0;
+  bool converged = false;
+  double rms_before_mm = 0.0, rms_after_mm = 0.0;  ///< weighted point-to-plane residual over all edges
+  std::vector<EdgeResidual> edges;                 ///< two per link, in the order of the links
+  std::vector<UnheldDirection> unheld;             ///< reported and not moved
+};
+
+/// Minimises Eq. 5 over all poses of one component at once; the CAD does not enter.
+///
+/// Levenberg-Marquardt on point-to-plane residuals of closest points, both ways over every link, analytic Jacobians,
+/// one kd-tree a view. Beyond the paper (docs/refine.md): reach and robust scale shrink edge by edge from the
+/// misalignment to the noise, border points attract nothing, directions that an edge does not hold are taken out of it.
+///
+/// Cost: about 1 us a point, link, direction and full iteration on a core; most iterations run on a thinned sample.
+/// Errors: invalid_argument (options, an empty segment, no normals, non-finite values, a bad link), not_possible (the
+/// links do not connect the views, or no correspondences are found), cancelled.
+[[nodiscard]] Result<Refinement> refine(std::span<const View> views, std::span<const Link> links,
+                                        const RefineOptions& options, const Context& context);
+
+}  // namespace asbuilt::refine

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/sampled_view.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "asbuilt/core/parallel.h"
+#include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/scan/normals.h"
+
+namespace asbuilt::refine {
+namespace {
+
+constexpr double kNeighbourhood = 2.5;                       // spacings
+constexpr double kFreeAngle = 2.0 * std::numbers::pi / 3.0;  // 120 degrees
+constexpr int kWallPoints = 3;        // neighbours straight below that make a border point one of an edge
+constexpr double kRimInSpacings = 5;  // spacings of the scan itself: as far as mixed measurements reach
+
+std::vector<std::uint32_t> even_indices(std::span<const Eigen::Vector3f> points, std::size_t count,
+                                        const Context& context) {
+  std::vector<std::uint32_t> all(points.size());
+  std::iota(all.begin(), all.end(), 0U);
+  if (points.size() <= count) return all;
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& point : points) box.extend(point);
+  const double extent = box.diagonal().norm();
+  if (!(extent > 0.0)) return {0U};
+
+  // On a surface the number of occupied cubes falls with the square of their edge: a few corrections suffice.
+  const auto wanted = static_cast<double>(count);
+  double spacing = extent / std::sqrt(wanted);
+  std::vector<std::uint32_t> best;
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    best = even_subset(points, spacing, context);
+    const double ratio = static_cast<double>(best.size()) / wanted;
+    if (ratio > 0.9 && ratio < 1.1) break;
+    spacing *= std::clamp(std::sqrt(ratio), 0.1, 10.0);
+  }
+  return best;
+}
+
+PointCloud chosen(const PointCloud& cloud, std::span<const std::uint32_t> indices) {
+  PointCloud subset;
+  for (const std::uint32_t i : indices) {
+    subset.positions.push_back(cloud.positions[i]);
+    if (cloud.has_normals()) subset.normals.push_back(cloud.normals[i]);
+  }
+  return subset;
+}
+
+// Counting cubes over tens of millions of points would take longer than the refinement; every nth of them will do.
+PointCloud thinned(const PointCloud& cloud, std::size_t at_most) {
+  const std::size_t step = (cloud.size() + at_most - 1) / at_most;
+  std::vector<std::uint32_t> indices;
+  for (std::size_t i = 0; i < cloud.size(); i += step) indices.push_back(static_cast<std::uint32_t>(i));
+  return chosen(cloud, indices);
+}
+
+struct Surroundings {
+  double free_angle = 2.0 * std::numbers::pi;  ///< the largest one around the normal without a neighbour
+  int below = 0;                               ///< neighbours straight above or below: a wall at an edge
+};
+
+Surroundings surroundings_of(const Eigen::Vector3f& centre, const Eigen::Vector3f& normal, const PointCloud& cloud,
+                             std::span<const KdTree::Neighbour> neighbours, std::vector<double>& angles) {
+  const Eigen::Vector3f u = normal.unitOrthogonal(), v = normal.cross(u);
+  Surroundings result;
+  angles.clear();
+  for (const KdTree::Neighbour& neighbour : neighbours) {
+    const Eigen::Vector3f offset = cloud.positions[neighbour.index] - centre;
+    const float a = offset.dot(u), b = offset.dot(v);
+    // Neighbours straight above or below have no direction to speak of.
+    const float across = a * a + b * b;
+    if (across > 0.05F * neighbour.squared_distance) angles.push_back(std::atan2(b, a));
+    result.below += across < 0.5F * neighbour.squared_distance ? 1 : 0;
+  }
+  if (angles.size() < 3) return result;
+  std::ranges::sort(angles);
+  double widest = angles.front() + 2.0 * std::numbers::pi - angles.back();
+  for (std::size_t i = 1; i < angles.size(); ++i) widest = std::max(widest, angles[i] - angles[i - 1]);
+  result.free_angle = widest;
+  return result;
+}
+
+// Every point within `reach_mm` of a marked one.
+std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& cloud, double reach_mm,
+                          const Context& context) {
+  std::vector<Eigen::Vector3f> seeds;
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    if (marked[i] != 0) seeds.push_back(cloud.positions[i]);
+  }
+  std::vector<char> result(marked.size(), 0);
+  if (seeds.empty()) return result;
+  const KdTree seed_tree(seeds);
+  parallel_for(context, cloud.size(), 512, [&](std::size_t i) {
+    result[i] = seed_tree.nearest(cloud.positions[i], static_cast<float>(reach_mm)).found() ? 1 : 0;
+  });
+  return result;
+}
+
+void mark_borders(SampledView& view, double scan_spacing_mm, const Context& context) {
+  const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
+  std::vector<char> border(places.size()), rim(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    border[i] = places[i] != Place::inside ? 1 : 0;
+    rim[i] = places[i] == Place::rim ? 1 : 0;
+  }
+  // A plane fitted across an edge or over a rim leans; how far from it that is felt follows from the fit's neighbours.
+  const auto fitted = static_cast<double>(scan::neighbours_for_normals(view.noise_sigma_mm, scan_spacing_mm));
+  const double fit_radius_mm = std::sqrt(fitted / std::numbers::pi) * scan_spacing_mm;
+  std::vector<char> doubtful = dilated(border, view.points, fit_radius_mm, context);
+  const std::vector<char> near_rim =
+      dilated(rim, view.points, std::max(fit_radius_mm, kRimInSpacings * scan_spacing_mm), context);
+  for (std::size_t i = 0; i < doubtful.size(); ++i) doubtful[i] = doubtful[i] != 0 || near_rim[i] != 0 ? 1 : 0;
+  view.is_border = std::move(border);
+  view.is_doubtful = std::move(doubtful);
+}
+
+}  // namespace
+
+PointCloud evenly_sampled(const PointCloud& cloud, std::size_t count, const Context& context) {
+  if (cloud.size() <= count) return cloud;
+  constexpr std::size_t kManyPerCube = 24;
+  const PointCloud thin = thinned(cloud, kManyPerCube * count);
+  return chosen(thin, even_indices(thin.positions, count, context));
+}
+
+std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double spacing_mm, const Context& context) {
+  std::vector<Place> places(cloud.size(), Place::inside);
+  const auto radius = static_cast<float>(kNeighbourhood * spacing_mm);
+  parallel_for_blocks(context, cloud.size(), 512, [&](std::size_t begin, std::size_t end) {
+    std::vector<KdTree::Neighbour> neighbours;
+    std::vector<double> angles;
+    for (std::size_t i = begin; i < end; ++i) {
+      tree.within(cloud.positions[i], radius, neighbours);
+      const Surroundings around = surroundings_of(cloud.positions[i], cloud.normals[i], cloud, neighbours, angles);
+      if (around.free_angle > kFreeAngle) places[i] = around.below >= kWallPoints ? Place::edge : Place::rim;
+    }
+  });
+  return places;
+}
+
+SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, std::size_t points,
+                         std::size_t coarse_points, bool with_borders, const Context& context) {
+  SampledView view;
+  view.points = evenly_sampled(segment, points, context);
+  view.coarse = even_indices(view.points.positions, coarse_points, context);
+  view.noise_sigma_mm = noise_sigma_mm;
+  view.tree = std::make_unique<const KdTree>(view.points.positions);
+  view.spacing_mm = median_spacing(view.points.positions, *view.tree);
+  view.is_border.assign(view.points.size(), 0);
+  view.is_doubtful.assign(view.points.size(), 0);
+  if (with_borders && view.spacing_mm > 0.0) mark_borders(view, median_spacing(segment.positions), context);
+  for (const Eigen::Vector3f& point : view.points.positions) view.centroid += point.cast<double>();
+  const auto count = static_cast<double>(view.points.size());
+  view.centroid /= count;
+  double squared = 0.0;
+  for (const Eigen::Vector3f& point : view.points.positions) {
+    squared += (point.cast<double>() - view.centroid).squaredNorm();
+  }
+  view.radius_mm = std::sqrt(squared / count);
+  return view;
+}
+
+}  // namespace asbuilt::refine

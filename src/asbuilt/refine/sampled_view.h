@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/point_cloud.h"
+
+namespace asbuilt::refine {
+
+/// An evenly spread subset of about `count` points (all of them if there are no more): cubes whose edge is found by
+/// secant steps on the logarithm of the count. Normals come along.
+[[nodiscard]] PointCloud evenly_sampled(const PointCloud& cloud, std::size_t count, const Context& context);
+
+/// Where a point lies in its cloud. Seen along the point's normal, neighbours within 2.5 spacings leave an angle of
+/// more than 120 degrees free at an edge and at a rim; at a sharp edge the surface goes on below, at a rim it ends.
+enum class Place : char { inside, edge, rim };
+[[nodiscard]] std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double spacing_mm,
+                                           const Context& context);
+
+/// A view as the refinement works with it, in its own scan frame.
+struct SampledView {
+  PointCloud points;                  ///< 20-30 k evenly spread points
+  std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
+  std::vector<char> is_border;        ///< on an edge or a rim: what lies on it may lie beyond it, normals mean little
+  std::vector<char> is_doubtful;      ///< so close to an edge that its normal leans, or to a rim that it may be mixed
+  double spacing_mm = 0.0;
+  double noise_sigma_mm = 0.0;
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+  double radius_mm = 0.0;  ///< root mean squared distance from the centroid
+  std::unique_ptr<const KdTree> tree;
+};
+
+[[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, std::size_t points,
+                                       std::size_t coarse_points, bool with_borders, const Context& context);
+
+}  // namespace asbuilt::refine

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/suspicious_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include "asbuilt/core/disjoint_sets.h"
+
+namespace asbuilt::refine {
+namespace {
+
+constexpr std::size_t kMinCandidates = 50;  // fewer say nothing about an edge
+constexpr double kWorseThanUsual = 3.0, kWorseThanWorst = 2.0, kConsistent = 1.5;
+constexpr int kMinOthers = 3, kMinNeighbours = 2;
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Size of the largest group of views, `without` left out, that edges of at most `limit` hold together.
+int largest_consistent_group(int view_count, std::span<const EdgeResidual> edges, int without, double limit) {
+  DisjointSets groups(view_count);
+  for (const EdgeResidual& edge : edges) {
+    if (edge.first == without || edge.second == without || edge.candidates < kMinCandidates) continue;
+    if (edge.spread_mm <= limit) groups.unite(edge.first, edge.second);
+  }
+  return static_cast<int>(groups.by_decreasing_size().front().size());
+}
+
+std::optional<SuspiciousView> judge(int view, int view_count, std::span<const EdgeResidual> edges, double floor_mm) {
+  std::vector<double> own, others;
+  std::set<int> neighbours;
+  for (const EdgeResidual& edge : edges) {
+    if (edge.candidates < kMinCandidates) continue;
+    const bool takes_part = edge.first == view || edge.second == view;
+    (takes_part ? own : others).push_back(edge.spread_mm);
+    if (takes_part) neighbours.insert(edge.first == view ? edge.second : edge.first);
+  }
+  if (static_cast<int>(neighbours.size()) < kMinNeighbours || others.empty()) return std::nullopt;
+  const double usual = median_of(others) + floor_mm;
+  const double best_own = *std::ranges::min_element(own) + floor_mm;
+  const double worst_other = *std::ranges::max_element(others) + floor_mm;
+  if (best_own <= kWorseThanUsual * usual || best_own <= kWorseThanWorst * worst_other) return std::nullopt;
+  if (largest_consistent_group(view_count, edges, view, kConsistent * usual) < kMinOthers) return std::nullopt;
+  return SuspiciousView{view, median_of(own), median_of(others)};
+}
+
+}  // namespace
+
+std::optional<SuspiciousView> suspicious_view(int view_count, std::span<const EdgeResidual> edges, double floor_mm) {
+  std::optional<SuspiciousView> worst;
+  for (int view = 0; view < view_count; ++view) {
+    const auto judged = judge(view, view_count, edges, floor_mm);
+    if (judged && (!worst || judged->spread_mm > worst->spread_mm)) worst = judged;
+  }
+  return worst;
+}
+
+}  // namespace asbuilt::refine
