@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/as_detected.h"
+
+namespace asbuilt::pipeline {
+
+io::ScanRecord as_detected(io::ScanRecord scan) {
+  using enum io::ScanStatus;
+  scan.covariance.reset();
+  scan.component.reset();
+  scan.model_from_scan.reset();
+  if (scan.status == dropped || scan.status == disconnected) {
+    scan.status = accepted;
+    scan.reason_code.clear();
+    scan.reason.clear();
+  }
+  if (scan.status == accepted || scan.status == ambiguous) scan.model_from_scan = scan.model_from_scan_detected;
+  return scan;
+}
+
+}  // namespace asbuilt::pipeline

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/joint_half.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "asbuilt/fuse/mesh.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/pipeline/posed_scans.h"
+#include "asbuilt/pipeline/report.h"
+
+namespace asbuilt::pipeline {
+namespace {
+
+/// Graph and refinement that nothing contradicts any more.
+struct Registration {
+  graph::PoseGraph graph;
+  std::vector<RefinedComponent> components;
+};
+
+void drop(std::vector<PosedScan>& scans, const Contradiction& contradiction, io::RunRecord& record,
+          const Context& context) {
+  const auto position = scans.begin() + contradiction.member;
+  io::ScanRecord& scan = record.scans[static_cast<std::size_t>(position->index)];
+  scan.status = io::ScanStatus::dropped;
+  scan.reason_code = "contradicted_by_scans";
+  scan.reason = fmt::format(
+      "under its pose it differs from the scans it overlaps by {:.3g} mm, they from one another by "
+      "{:.3g} mm",
+      contradiction.spread_mm, contradiction.others_spread_mm);
+  scan.model_from_scan.reset();
+  context.warn(fmt::format("{}: dropped: {}", scan.path, scan.reason));
+  scans.erase(position);
+}
+
+/// Links and refines; drops one contradicted scan at a time and begins again without it.
+Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
+                                RunFolder& folder, io::RunRecord& record, const Context& context) {
+  while (true) {
+    Registration registration;
+    {
+      const auto timed = folder.stage("graph");
+      ASBUILT_TRY(graph, link(scans, model, options, context));
+      registration.graph = std::move(graph);
+    }
+    const auto timed = folder.stage("refine");
+    std::optional<Contradiction> contradiction;
+    for (const std::vector<int>& members : registration.graph.components) {
+      ASBUILT_TRY(component, refine_component(members, registration.graph, scans, model, options, context));
+      if (!options.paper_mode && !contradiction) contradiction = contradiction_in(component, scans);
+      registration.components.push_back(std::move(component));
+    }
+    if (!contradiction) return registration;
+    drop(scans, *contradiction, record, context);
+  }
+}
+
+io::GraphRecord recorded_graph(const graph::PoseGraph& graph, const std::vector<PosedScan>& scans) {
+  const auto index = [&](int scan) { return scans[static_cast<std::size_t>(scan)].index; };
+  io::GraphRecord record;
+  for (const graph::PairOverlap& pair : graph.overlaps) {
+    const bool linked = std::ranges::find(graph.edges, pair) != graph.edges.end();
+    record.overlaps.push_back({index(pair.first), index(pair.second), pair.overlap, linked});
+  }
+  for (const std::vector<int>& component : graph.components) {
+    record.components.emplace_back();
+    for (const int scan : component) record.components.back().push_back(index(scan));
+  }
+  return record;
+}
+
+io::RefinementRecord recorded_refinement(const RefinedComponent& component, int number, const Options& options,
+                                         const std::vector<PosedScan>& scans) {
+  const auto index = [&](int view) {
+    return scans[static_cast<std::size_t>(component.members[static_cast<std::size_t>(view)])].index;
+  };
+  const refine::Refinement& refinement = component.refinement;
+  io::RefinementRecord record;
+  record.component = number;
+  record.fixed_scan = index(refinement.fixed_view);
+  record.iterations = refinement.iterations;
+  record.rms_before = refinement.rms_before_mm;
+  record.rms_after = refinement.rms_after_mm;
+  record.converged = refinement.converged;
+  record.gauge_method = options.gauge == Gauge::best_fit ? "best_fit" : "fixed";
+  record.model_from_refined = component.model_from_refined;
+  for (const refine::EdgeResidual& edge : refinement.edges) {
+    record.edges.push_back({index(edge.first), index(edge.second), edge.pairs, edge.rms_mm});
+  }
+  return record;
+}
+
+/// The weakest place of a graph in pieces, for the reason of a scan that hangs loose.
+std::string missing_link(int scan, const std::vector<int>& largest, const graph::PoseGraph& graph,
+                         const std::vector<PosedScan>& scans, const io::RunRecord& record) {
+  for (const graph::PairOverlap& pair : graph.overlaps) {  // by decreasing overlap
+    const int other = pair.first == scan ? pair.second : pair.second == scan ? pair.first : -1;
+    if (other < 0 || std::ranges::find(largest, other) == largest.end()) continue;
+    const auto& name = record.scans[static_cast<std::size_t>(scans[static_cast<std::size_t>(other)].index)].name;
+    return fmt::format("its best overlap with the largest component, with {}, is {:.0f} %", name, 100.0 * pair.overlap);
+  }
+  return "it overlaps with no scan of the largest component";
+}
+
+void describe_scans(io::RunRecord& record, const Registration& registration, const std::vector<PosedScan>& scans,
+                    const Context& context) {
+  for (std::size_t number = 0; number < registration.components.size(); ++number) {
+    for (const int member : registration.components[number].members) {
+      const PosedScan& posed = scans[static_cast<std::size_t>(member)];
+      io::ScanRecord& scan = record.scans[static_cast<std::size_t>(posed.index)];
+      scan.model_from_scan = posed.model_from_local * Eigen::Translation3d(-scan.offset);
+      scan.covariance = posed.covariance;
+      scan.component = static_cast<int>(number);
+      if (number == 0) continue;
+      scan.status = io::ScanStatus::disconnected;
+      scan.reason_code = "disconnected";
+      scan.reason = "a good detection, but " +
+                    missing_link(member, registration.graph.components.front(), registration.graph, scans, record);
+      context.warn(fmt::format("{}: disconnected: {}", scan.path, scan.reason));
+    }
+  }
+}
+
+Result<fuse::Reconstruction> fused(const RefinedComponent& largest, std::vector<PosedScan>& scans,
+                                   const Options& options, const Context& context) {
+  std::vector<fuse::PosedSegment> segments;
+  for (const int member : largest.members) {
+    PosedScan& scan = scans[static_cast<std::size_t>(member)];
+    segments.push_back({std::move(scan.part), scan.model_from_local, scan.noise_sigma_mm, scan.spacing_mm, scan.index});
+  }
+  return fuse::fuse(segments, options.fuse, context);
+}
+
+/// mesh.ply, if it is wanted. A cloud that makes no surface is worth a warning; the rest of the result stands.
+Result<void> write_mesh(const fuse::Reconstruction& reconstruction, const Options& options, RunFolder& folder,
+                        const Context& context) {
+  folder.remove("mesh.ply");
+  if (!options.mesh) return {};
+  const auto timed = folder.stage("mesh");
+  const auto mesh = fuse::surface_mesh(reconstruction, options.surface_mesh, context);
+  if (mesh) return io::write_mesh_ply(folder.file("mesh.ply"), *mesh);
+  if (mesh.error().code != ErrorCode::not_possible) return tl::unexpected(mesh.error());
+  context.warn("no mesh.ply: " + mesh.error().message);
+  return {};
+}
+
+}  // namespace
+
+Result<void> register_scans(const LoadedModel& model, const Options& options, RunFolder& folder, io::RunRecord& record,
+                            const Context& context) {
+  ASBUILT_TRY(scans, load_posed_scans(record, folder));
+  if (scans.empty()) {
+    record.state = io::RunState::failed;
+    for (const char* stale : {"reconstruction.ply", "mesh.ply", "report.json"}) folder.remove(stale);
+    return {};
+  }
+  ASBUILT_TRY(registration, registered(scans, model, options, folder, record, context));
+  record.graph = recorded_graph(registration.graph, scans);
+  record.refinement.emplace();
+  for (std::size_t i = 0; i < registration.components.size(); ++i) {
+    record.refinement->push_back(recorded_refinement(registration.components[i], static_cast<int>(i), options, scans));
+  }
+  describe_scans(record, registration, scans, context);
+
+  fuse::Reconstruction reconstruction;
+  {
+    const auto timed = folder.stage("fuse");
+    ASBUILT_TRY(fused_scans, fused(registration.components.front(), scans, options, context));
+    reconstruction = std::move(fused_scans);
+  }
+  ASBUILT_CHECK(write_mesh(reconstruction, options, folder, context));
+  const auto timed = folder.stage("inspect");
+  ASBUILT_TRY(deviations, inspect::inspect(reconstruction.cloud, model.prepared, options.inspect, context));
+  record.deviation = recorded_deviation(deviations);
+  record.state = io::RunState::complete;
+  ASBUILT_CHECK(write_reconstruction(folder.file("reconstruction.ply"), reconstruction, deviations.deviation_mm));
+  return write_report(folder.file("report.json"), record, deviations, options.inspect);
+}
+
+}  // namespace asbuilt::pipeline

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/judge_scan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "asbuilt/detect/detect.h"
+#include "asbuilt/pipeline/unit_check.h"
+#include "asbuilt/verify/verify.h"
+
+namespace asbuilt::pipeline {
+namespace {
+
+/// From coordinates with the offset taken off to those of the file.
+Pose for_file(const Pose& model_from_local, const Eigen::Vector3d& offset_mm) {
+  return model_from_local * Eigen::Translation3d(-offset_mm);
+}
+Pose for_local(const Pose& model_from_scan, const Eigen::Vector3d& offset_mm) {
+  return model_from_scan * Eigen::Translation3d(offset_mm);
+}
+
+scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::ScanFile& file) {
+  if (request.stated.kind == scan::Viewpoint::Kind::point) request.stated.value -= file.offset_mm;
+  // The origin, which `auto` would try, is kilometres away from points that needed an offset.
+  if (!file.offset_mm.isZero(0.0) && !file.viewpoint_mm) request.automatic = false;
+  return request;
+}
+
+Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, const Context& context) {
+  const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file);
+  std::optional<Eigen::Vector3d> file_viewpoint;
+  if (file.viewpoint_mm) file_viewpoint = *file.viewpoint_mm - file.offset_mm;
+  auto scan = scan::prepare_scan(file.cloud, file_viewpoint, request, half.options.scan, context);
+  if (scan || scan.error().code == ErrorCode::cancelled) return scan;
+  return fail(scan.error().code, fmt::format("{}: {}", file.path.string(), scan.error().message));
+}
+
+void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::ScanFile& file) {
+  record.points = scan.cloud.size();
+  record.offset = file.offset_mm;
+  record.noise_sigma = scan.noise_sigma_mm;
+  record.spacing = scan.spacing_mm;
+  record.normals_oriented = scan.normals_oriented;
+  if (scan.viewpoint.kind == scan::Viewpoint::Kind::point) {
+    record.viewpoint = scan.viewpoint.value + file.offset_mm;
+    record.viewpoint_kind = "point";
+  } else if (scan.viewpoint.kind == scan::Viewpoint::Kind::direction) {
+    record.viewpoint = scan.viewpoint.value;
+    record.viewpoint_kind = "direction";
+  }
+  record.warnings = file.notes;
+  record.warnings.insert(record.warnings.end(), scan.warnings.begin(), scan.warnings.end());
+}
+
+io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Vector3d& offset_mm) {
+  return {for_file(candidate.model_from_scan, offset_mm),
+          candidate.votes,
+          candidate.score,
+          candidate.visible_share,
+          candidate.free_space_violations,
+          candidate.normal_agreement,
+          candidate.rms_mm,
+          candidate.hidden_share,
+          candidate.support,
+          candidate.explained_samples};
+}
+
+void describe_detection(io::ScanRecord& record, const verify::Detection& detection) {
+  record.status = detection.status == verify::Status::accepted    ? io::ScanStatus::accepted
+                  : detection.status == verify::Status::ambiguous ? io::ScanStatus::ambiguous
+                                                                  : io::ScanStatus::rejected;
+  record.reason_code = detection.reason == verify::Reason::none ? "" : verify::code_of(detection.reason);
+  record.reason = detection.explanation;
+  for (const verify::Candidate& candidate : detection.candidates) {
+    record.candidates.push_back(recorded(candidate, record.offset));
+  }
+  if (record.candidates.empty()) return;  // nothing was proposed: no figures
+  const verify::Candidate& best = detection.best;
+  record.model_from_scan_detected = for_file(best.model_from_scan, record.offset);
+  if (detection.status != verify::Status::rejected) record.model_from_scan = record.model_from_scan_detected;
+  record.votes = best.votes;
+  record.score = best.score;
+  record.visible_share = best.visible_share;
+  record.free_space_violations = best.free_space_violations;
+  record.normal_agreement = best.normal_agreement;
+  record.margin = detection.margin;
+  record.segment_points = detection.segment.size();
+}
+
+/// Starts that the user gave for this scan come first, with the votes of the best.
+std::vector<detect::Hypothesis> with_starts(std::vector<detect::Hypothesis> hypotheses, const io::ScanFile& file,
+                                            const std::vector<io::NamedPose>& starts) {
+  const double votes = hypotheses.empty() ? 1.0 : hypotheses.front().votes;
+  std::vector<detect::Hypothesis> all;
+  for (const io::NamedPose& start : starts) {
+    if (!names_scan(start.scan, file.path.string(), file.name)) continue;
+    all.push_back({for_local(start.model_from_scan, file.offset_mm), votes});
+  }
+  all.insert(all.end(), hypotheses.begin(), hypotheses.end());
+  return all;
+}
+
+std::optional<int> accepted_candidate(const io::ScanFile& file, const Options& options) {
+  for (const std::string& text : options.accept) {
+    const auto acceptance = parse_acceptance(text);  // validated before
+    if (acceptance && names_scan(acceptance->scan, file.path.string(), file.name)) return acceptance->candidate;
+  }
+  return std::nullopt;
+}
+
+/// Verifies again with the one candidate that the user vouches for.
+Result<verify::Detection> accept_for_user(const verify::Detection& detection, int candidate, const scan::Scan& scan,
+                                          const io::ScanFile& file, const ScanHalf& half, const Context& context) {
+  const auto index = static_cast<std::size_t>(candidate);
+  if (index >= detection.candidates.size()) {
+    return fail(ErrorCode::not_possible, fmt::format("--accept {}:{}: the scan has {} candidates, counted from 0",
+                                                     file.name, candidate, detection.candidates.size()));
+  }
+  const verify::Candidate& chosen = detection.candidates[index];
+  const std::vector<detect::Hypothesis> hypothesis{{chosen.model_from_scan, chosen.votes}};
+  return verify::verify(scan, half.model.prepared, hypothesis, half.options.verify, context, true);
+}
+
+}  // namespace
+
+Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
+                              const Context& context) {
+  JudgedScan judged;
+  Result<scan::Scan> scan;
+  {
+    const auto timed = folder.stage("prepare_scan", file.name);
+    scan = prepared(file, half, context);
+  }
+  if (!scan) return tl::unexpected(scan.error());
+  describe_scan(judged.record, *scan, file);
+  if (const auto contradiction = size_contradiction(*scan, half.model.prepared, half.options)) {
+    judged.record.status = io::ScanStatus::rejected;
+    judged.record.reason_code = verify::code_of(verify::Reason::scan_too_small);
+    judged.record.reason = *contradiction;
+    return judged;
+  }
+
+  Result<std::vector<detect::Hypothesis>> hypotheses;
+  {
+    const auto timed = folder.stage("detect", file.name);
+    hypotheses = detect::find_hypotheses(*scan, half.codebook, half.options.detect, context);
+  }
+  if (!hypotheses) return tl::unexpected(hypotheses.error());
+
+  const auto timed = folder.stage("verify", file.name);
+  const auto candidates = with_starts(std::move(*hypotheses), file, half.starts);
+  ASBUILT_TRY(detection, verify::verify(*scan, half.model.prepared, candidates, half.options.verify, context));
+  const auto vouched_for = accepted_candidate(file, half.options);
+  if (vouched_for) {
+    ASBUILT_TRY(accepted, accept_for_user(detection, *vouched_for, *scan, file, half, context));
+    accepted.candidates = detection.candidates;  // the list the user chose from
+    detection = std::move(accepted);
+  }
+  describe_detection(judged.record, detection);
+  if (vouched_for) judged.record.reason_code = "accepted_by_user";
+  if (!detection.segment.empty()) judged.segment = cut_out(*scan, detection, half.model.prepared);
+  return judged;
+}
+
+}  // namespace asbuilt::pipeline

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/result.h"
+#include "asbuilt/detect/codebook.h"
+#include "asbuilt/io/pose_file.h"
+#include "asbuilt/io/run_record.h"
+#include "asbuilt/io/scan_file.h"
+#include "asbuilt/pipeline/load_model.h"
+#include "asbuilt/pipeline/options.h"
+#include "asbuilt/pipeline/run_folder.h"
+#include "asbuilt/pipeline/scan_hints.h"
+#include "asbuilt/pipeline/segment_file.h"
+
+namespace asbuilt::pipeline {
+
+/// What all scans of a run have in common.
+struct ScanHalf {
+  const LoadedModel& model;
+  const detect::Codebook& codebook;
+  const Options& options;
+  const Viewpoints& viewpoints;
+  const std::vector<io::NamedPose>& starts;
+};
+
+/// A scan's entry in the record, and its part if there is one.
+struct JudgedScan {
+  io::ScanRecord record;
+  std::optional<Segment> segment;
+};
+
+/// Prepares a scan, detects the part in it and verifies; poses in the record are for the coordinates of the file.
+/// Errors: those of the stages; nothing is decided then.
+[[nodiscard]] Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
+                                            const Context& context);
+
+}  // namespace asbuilt::pipeline

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/load_model.h"
+
+#include <fmt/format.h>
+
+#include "asbuilt/io/file.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/model/prepared_file.h"
+
+namespace asbuilt::pipeline {
+
+namespace {
+
+Result<model::PreparedModel> prepared_from_mesh(const std::string& path, std::string sha256, const Options& options,
+                                                const Context& context) {
+  ASBUILT_TRY(mesh, io::read_mesh(path, options.model_unit));
+  auto prepared = model::prepare(mesh, options.model, context);
+  if (!prepared && prepared.error().code == ErrorCode::cancelled) return tl::unexpected(prepared.error());
+  // A mesh that cannot be a part is no readable input, whatever its syntax.
+  if (!prepared) return fail(ErrorCode::unreadable_input, fmt::format("{}: {}", path, prepared.error().message));
+  prepared->source_path = path;
+  prepared->source_sha256 = std::move(sha256);
+  return std::move(*prepared);
+}
+
+}  // namespace
+
+Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context) {
+  ASBUILT_TRY(content, io::read_file(path));
+  std::string sha256 = io::sha256(content);
+  content = {};
+  LoadedModel loaded;
+  ASBUILT_TRY(prepared, model::is_prepared_file(path) ? model::load_prepared(path, context)
+                                                      : prepared_from_mesh(path, sha256, options, context));
+  for (const std::string& note : prepared.report.notes) context.warn(fmt::format("{}: {}", path, note));
+  // A prepared model is the same model as the mesh it came from.
+  if (!prepared.source_sha256.empty()) sha256 = prepared.source_sha256;
+  loaded.record = {
+      path, std::move(sha256), prepared.skin.triangles.size(), prepared.diameter, prepared.sampling_distance, "none"};
+  loaded.prepared = std::move(prepared);
+  return loaded;
+}
+
+}  // namespace asbuilt::pipeline

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/point_cloud.h"
+#include "asbuilt/core/result.h"
+#include "asbuilt/pipeline/load_model.h"
+#include "asbuilt/pipeline/options.h"
+
+namespace asbuilt::pipeline {
+
+/// What `asbuilt inspect` measures: the points of a cloud, or even samples of a mesh, in the model frame; mm.
+/// Errors: unreadable_input.
+[[nodiscard]] Result<PointCloud> measured_cloud(const std::string& path, const LoadedModel& model,
+                                                const Options& options, const Context& context);
+
+/// A record that knows its model and version and no scans.
+[[nodiscard]] io::RunRecord record_of_model(const LoadedModel& model);
+
+}  // namespace asbuilt::pipeline

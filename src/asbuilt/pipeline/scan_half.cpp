@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/scan_half.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <new>
+#include <utility>
+
+#include "asbuilt/io/file.h"
+#include "asbuilt/io/scan_file.h"
+#include "asbuilt/pipeline/as_detected.h"
+#include "asbuilt/pipeline/judge_scan.h"
+#include "asbuilt/pipeline/pipeline_version.h"
+#include "asbuilt/pipeline/unit_check.h"
+
+namespace asbuilt::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kScansTriedWithOtherUnits = 2;
+
+/// What reading a scan found out before anything was computed.
+struct InputFile {
+  std::string path, sha256;
+  Result<std::vector<io::ScanFile>> scans;
+};
+
+InputFile read_input(const std::string& path, const Options& options) {
+  auto content = io::read_file(path);
+  if (!content) return {path, "", tl::unexpected(content.error())};
+  std::string sha256 = io::sha256(*content);
+  content->clear();
+  content->shrink_to_fit();
+  return {path, std::move(sha256), io::read_scans(path, options.scan_unit)};
+}
+
+io::ScanRecord failed_record(const std::string& path, std::string name, const Error& error) {
+  io::ScanRecord record;
+  record.path = path;
+  record.name = std::move(name);
+  record.status = io::ScanStatus::failed;
+  record.reason_code = error.code == ErrorCode::unreadable_input ? "unreadable" : "not_possible";
+  record.reason = error.message;
+  return record;
+}
+
+bool is_excluded(const std::string& path, const std::string& name, const Options& options) {
+  return std::ranges::any_of(options.exclude, [&](const std::string& typed) { return names_scan(typed, path, name); });
+}
+
+io::ScanRecord excluded_record(const io::ScanFile& file, const std::string& path) {
+  io::ScanRecord record;
+  record.path = path;
+  record.name = file.name;
+  record.points = file.cloud.size();
+  record.status = io::ScanStatus::rejected;
+  record.reason_code = "excluded";
+  record.reason = "left out by --exclude";
+  return record;
+}
+
+/// The same options as far as the scan half is concerned, apart from those that name single scans.
+bool same_for_scans(const io::Options& a, const io::Options& b) {
+  const auto value = [](const io::Options& options, const std::string& name) {
+    const auto found = std::ranges::find(options, name, &io::Options::value_type::first);
+    return found == options.end() ? std::optional<io::OptionValue>() : std::optional(found->second);
+  };
+  return std::ranges::all_of(a, [&](const auto& option) {
+    return option.first == "exclude" || option.first == "accept" || value(b, option.first) == option.second;
+  });
+}
+
+/// What an earlier run left, as far as it may stand.
+class FinishedScans {
+ public:
+  FinishedScans(std::optional<io::RunRecord> earlier, const io::Options& options, const RunFolder& folder)
+      : folder_(folder) {
+    if (earlier && earlier->version == kVersion && same_for_scans(options, earlier->options)) {
+      earlier_ = std::move(earlier);
+    }
+  }
+
+  /// The finished entry of the scan that now has this index, or nothing.
+  [[nodiscard]] const io::ScanRecord* find(std::size_t index, const std::string& path, const std::string& sha256,
+                                           int index_in_file, const Options& options) const {
+    if (!earlier_ || index >= earlier_->scans.size()) return nullptr;
+    const io::ScanRecord& scan = earlier_->scans[index];
+    const bool same = scan.path == path && scan.sha256 == sha256 && scan.index_in_file == index_in_file;
+    return same && stands(scan, index, options) ? &scan : nullptr;
+  }
+
+ private:
+  [[nodiscard]] bool stands(const io::ScanRecord& scan, std::size_t index, const Options& options) const {
+    // The joint half rewrote these; their own reasons are gone. A failure may have gone away.
+    const auto redone = {io::ScanStatus::failed, io::ScanStatus::dropped, io::ScanStatus::disconnected};
+    if (std::ranges::find(redone, scan.status) != redone.end()) return false;
+    const bool named = scan.reason_code == "excluded" || scan.reason_code == "accepted_by_user" ||
+                       is_excluded(scan.path, scan.name, options) || !options.accept.empty();
+    if (named) return false;
+    return !scan.has_segment() || fs::exists(folder_.file(io::segment_file(index, scan.name)));
+  }
+
+  std::optional<io::RunRecord> earlier_;
+  const RunFolder& folder_;
+};
+
+Result<void> check_names(std::span<const std::string> scan_paths, const Options& options) {
+  const auto known = [&](const std::string& typed) {
+    // A file with several scans names them NAME_NN, which only reading it tells.
+    return std::ranges::any_of(scan_paths, [&](const std::string& path) {
+      const std::string stem = fs::path(path).stem().string();
+      return names_scan(typed, path, stem) || typed.starts_with(stem + "_");
+    });
+  };
+  for (const std::string& typed : options.exclude) {
+    if (known(typed)) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("--exclude {}: none of the scans has this name", typed));
+  }
+  for (const std::string& text : options.accept) {
+    ASBUILT_TRY(acceptance, parse_acceptance(text));
+    if (known(acceptance.scan)) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("--accept {}: none of the scans has this name", text));
+  }
+  return {};
+}
+
+/// Files that steer detection are inputs like any other: another content is another run.
+Result<void> add_hashes(io::Options& record, const Options& options) {
+  for (const auto& [name, path] :
+       {std::pair("poses_sha256", options.poses), std::pair("viewpoint_sha256", options.viewpoint)}) {
+    std::error_code ignored;
+    if (path.empty() || !fs::is_regular_file(path, ignored)) continue;
+    ASBUILT_TRY(content, io::read_file(path));
+    record.emplace_back(name, io::sha256(content));
+  }
+  return {};
+}
+
+/// Goes through the files of a run and fills its record.
+class ScanHalfRun {
+ public:
+  ScanHalfRun(const ScanHalf& half, FinishedScans finished, io::RunRecord& record, RunFolder& folder,
+              const Context& context)
+      : half_(half), finished_(std::move(finished)), record_(record), folder_(folder), context_(context) {}
+
+  [[nodiscard]] Result<void> take(const std::string& path) {
+    InputFile input = [&] {
+      const auto timed = folder_.stage("read", fs::path(path).stem().string());
+      return read_input(path, half_.options);
+    }();
+    if (!input.scans) {
+      context_.warn(input.scans.error().message);
+      auto record = failed_record(path, fs::path(path).stem().string(), input.scans.error());
+      record.sha256 = input.sha256;
+      return add(std::move(record));
+    }
+    for (io::ScanFile& file : *input.scans) {
+      if (context_.cancelled()) return fail(ErrorCode::cancelled, "interrupted");
+      io::ScanRecord record;
+      if (const auto* finished =
+              finished_.find(record_.scans.size(), path, input.sha256, file.index_in_file, half_.options)) {
+        record = as_detected(*finished);
+      } else {
+        ASBUILT_TRY(judged, judge(file, path));
+        record = std::move(judged);
+      }
+      record.path = path;
+      record.name = file.name;
+      record.sha256 = input.sha256;
+      record.index_in_file = file.index_in_file;
+      record.scans_in_file = static_cast<int>(input.scans->size());
+      file.cloud = {};  // one scan at a time
+      ASBUILT_CHECK(add(std::move(record)));
+    }
+    return {};
+  }
+
+ private:
+  Result<void> add(io::ScanRecord record) {
+    record_.scans.push_back(std::move(record));
+    return folder_.checkpoint(record_);
+  }
+
+  /// The entry of one scan; an error only if the whole run must stop.
+  Result<io::ScanRecord> judge(const io::ScanFile& file, const std::string& path) {
+    if (is_excluded(path, file.name, half_.options)) return excluded_record(file, path);
+    auto judged = judged_in_bounded_memory(file);
+    if (judged) {
+      if (judged->segment) ASBUILT_CHECK(write(*judged, file.name));
+      for (const std::string& warning : judged->record.warnings) {
+        context_.warn(fmt::format("{}: {}", path, warning));
+      }
+      return std::move(judged->record);
+    }
+    if (judged.error().code == ErrorCode::cancelled) return tl::unexpected(judged.error());
+    context_.warn(judged.error().message);
+    return failed_record(path, file.name, judged.error());
+  }
+
+  Result<JudgedScan> judged_in_bounded_memory(const io::ScanFile& file) {
+    try {
+      return judge_scan(file, half_, folder_, context_);
+    } catch (const std::bad_alloc&) {
+      return fail(ErrorCode::not_possible, fmt::format("{}: {} points do not fit into the memory of this machine",
+                                                       file.path.string(), file.cloud.size()));
+    }
+  }
+
+  Result<void> write(const JudgedScan& judged, const std::string& name) {
+    const auto timed = folder_.stage("write_segment", name);
+    const fs::path path = folder_.file(io::segment_file(record_.scans.size(), name));
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    if (error) {
+      return fail(ErrorCode::unwritable_output,
+                  fmt::format("{}: cannot be made: {}", path.parent_path().string(), error.message()));
+    }
+    return write_segment(path, *judged.segment, judged.record.offset);
+  }
+
+  const ScanHalf& half_;
+  FinishedScans finished_;
+  io::RunRecord& record_;
+  RunFolder& folder_;
+  const Context& context_;
+};
+
+/// When nothing was found anywhere, a mistaken unit is the likeliest cause: says so if it is.
+void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder, const Context& context) {
+  const bool found_something = std::ranges::any_of(record.scans, [](const io::ScanRecord& scan) {
+    return scan.status == io::ScanStatus::accepted || scan.status == io::ScanStatus::ambiguous;
+  });
+  if (found_something) return;
+  std::size_t tried = 0;
+  for (io::ScanRecord& scan : record.scans) {
+    if (scan.status != io::ScanStatus::rejected || scan.points == 0 || scan.reason_code == "excluded") continue;
+    if (scan.reason_code == "scan_too_small" || scan.reason_code == "wrong_unit") continue;
+    if (tried++ == kScansTriedWithOtherUnits || context.cancelled()) return;
+    const auto timed = folder.stage("try_units", scan.name);
+    const auto files = io::read_scans(scan.path, half.options.scan_unit);
+    if (!files || static_cast<std::size_t>(scan.index_in_file) >= files->size()) continue;
+    const auto factor = factor_that_finds_the_part((*files)[static_cast<std::size_t>(scan.index_in_file)],
+                                                   half.model.prepared, half.codebook, half.options, context);
+    if (!factor) continue;
+    scan.reason_code = verify::code_of(verify::Reason::wrong_unit);
+    scan.reason =
+        fmt::format("the part is not there at this size, but it is when the scan is {:g} times as large: try {}",
+                    *factor, flag_for_factor(*factor, half.options));
+    return;
+  }
+}
+
+}  // namespace
+
+Result<io::RunRecord> detect_scans(const LoadedModel& model, std::span<const std::string> scan_paths,
+                                   const Options& options, RunFolder& folder, const Context& context) {
+  ASBUILT_CHECK(check_names(scan_paths, options));
+  ASBUILT_TRY(viewpoints, Viewpoints::from_text(options.viewpoint, options.scan_unit));
+  std::vector<io::NamedPose> starts;
+  if (!options.poses.empty()) {
+    ASBUILT_TRY(read, io::read_poses(options.poses, io::Unit::millimetre));
+    starts = std::move(read);
+  }
+  ASBUILT_TRY(earlier, folder.earlier_run(model.record));
+
+  io::RunRecord record;
+  record.version = kVersion;
+  record.options = recorded(options, {Half::model, Half::scan});
+  ASBUILT_CHECK(add_hashes(record.options, options));
+  record.model = model.record;
+  ASBUILT_TRY(codebook, [&] {
+    const auto timed = folder.stage("codebook");
+    return detect::build_codebook(model.prepared, options.detect, context);
+  }());
+
+  const ScanHalf half{model, *codebook, options, viewpoints, starts};
+  ScanHalfRun run(half, FinishedScans(std::move(earlier), record.options, folder), record, folder, context);
+  for (std::size_t i = 0; i < scan_paths.size(); ++i) {
+    if (context.cancelled()) break;
+    if (auto taken = run.take(scan_paths[i]); !taken) {
+      if (taken.error().code == ErrorCode::cancelled) break;
+      return tl::unexpected(taken.error());
+    }
+    context.report_progress(static_cast<double>(i + 1) / static_cast<double>(scan_paths.size()));
+  }
+  if (!context.cancelled()) look_for_mistaken_unit(record, half, folder, context);
+  ASBUILT_CHECK(folder.checkpoint(record, true));
+  if (context.cancelled()) return fail(ErrorCode::cancelled, "interrupted; the same command goes on from here");
+  return record;
+}
+
+}  // namespace asbuilt::pipeline

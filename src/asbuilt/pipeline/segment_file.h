@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "asbuilt/core/point_cloud.h"
+#include "asbuilt/core/result.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/scan/scan.h"
+#include "asbuilt/verify/detection.h"
+
+namespace asbuilt::pipeline {
+
+/// What segments/NNN_NAME.ply holds: the part's points of a scan and a margin around them, at full density, in the scan
+/// frame minus `offset_mm`, with normals turned outwards.
+struct Segment {
+  PointCloud cloud;
+  std::vector<std::uint8_t> is_part;  ///< one per point: 1 part, 0 margin
+};
+
+/// Cuts segment and margin out of a scan. Where the scan's own normals have no trustworthy sign, they take that of the
+/// model's surface next to them, which is known once the pose is.
+[[nodiscard]] Segment cut_out(const scan::Scan& scan, const verify::Detection& detection,
+                              const model::PreparedModel& model);
+
+/// Positions are written as double where there is an offset, in the coordinates of the scan's file (mm) always.
+[[nodiscard]] Result<void> write_segment(const std::filesystem::path& path, const Segment& segment,
+                                         const Eigen::Vector3d& offset_mm);
+
+/// The part's points alone, in the scan frame minus `offset_mm`.
+/// Errors: unreadable_input, also when a column of ours is missing.
+[[nodiscard]] Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm);
+
+}  // namespace asbuilt::pipeline

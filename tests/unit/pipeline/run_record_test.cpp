@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/io/run_record.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace asbuilt::io {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+RunRecord example() {
+  RunRecord record;
+  record.version = "1.2.3";
+  record.options = {{"flag", true},
+                    {"count", std::int64_t{7}},
+                    {"ratio", 0.1},
+                    {"word", std::string("auto")},
+                    {"list", std::vector<std::string>{"a", "b"}},
+                    {"empty", std::vector<std::string>{}}};
+  record.model = {"part \"x\".stl", "ab", 12, 100.0 / 3.0, 1e-300, "none"};
+  ScanRecord scan;
+  scan.path = "a b/scan.ply";
+  scan.name = "scan";
+  scan.points = 3'000'000'000ULL;
+  scan.viewpoint = Eigen::Vector3d(0.1, -2e9, 1.0 / 3.0);
+  scan.viewpoint_kind = "point";
+  scan.status = ScanStatus::accepted;
+  scan.model_from_scan_detected = pose_from_twist((Vector6d() << 0.1, 0.2, 0.3, 1e6 + 0.1, 2, 3).finished());
+  scan.model_from_scan = scan.model_from_scan_detected;
+  scan.covariance = Matrix6d::Identity() / 3.0;
+  scan.component = 0;
+  scan.score = 0.1 + 0.2;
+  scan.candidates.push_back({});
+  scan.segment_points = 5;
+  scan.warnings = {"one"};
+  record.scans = {scan, ScanRecord{}};
+  record.graph = GraphRecord{{{0, 1, 0.25, true}}, {{0, 1}}};
+  record.refinement = {RefinementRecord{}};
+  record.deviation = DeviationRecord{0.1, 0.2, 0.3, 0.4, std::nullopt, 0.5};
+  return record;
+}
+
+TEST(RunRecord, ComesBackExactlyAsItWasWritten) {
+  const std::string text = to_json(example());
+  const auto back = run_record_from_json(text, "test");
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_EQ(to_json(*back), text);
+  EXPECT_EQ(back->scans[0].model_from_scan->matrix(), example().scans[0].model_from_scan->matrix());
+  EXPECT_EQ(back->scans[0].score, 0.1 + 0.2);
+  EXPECT_EQ(back->options, example().options);
+}
+
+TEST(RunRecord, HasTheKeysOfTheContractInItsOrder) {
+  const std::string text = to_json(example());
+  std::size_t last = 0;
+  for (const char* key : {"\"asbuilt\"",
+                          "\"state\"",
+                          "\"unit\"",
+                          "\"options\"",
+                          "\"model\"",
+                          "\"sampling_distance\"",
+                          "\"symmetry\"",
+                          "\"scans\"",
+                          "\"index_in_file\"",
+                          "\"points\"",
+                          "\"viewpoint\"",
+                          "\"noise_sigma\"",
+                          "\"status\"",
+                          "\"reason_code\"",
+                          "\"model_from_scan_detected\"",
+                          "\"covariance\"",
+                          "\"component\"",
+                          "\"votes\"",
+                          "\"free_space_violations\"",
+                          "\"margin\"",
+                          "\"candidates\"",
+                          "\"segment_points\"",
+                          "\"graph\"",
+                          "\"refinement\"",
+                          "\"deviation\"",
+                          "\"in_tolerance\": null",
+                          "\"coverage\""}) {
+    const std::size_t found = text.find(key, last);
+    ASSERT_NE(found, std::string::npos) << key;
+    last = found;
+  }
+}
+
+TEST(RunRecord, OfTheScanHalfHasNoJointPart) {
+  RunRecord record = example();
+  record.graph.reset();
+  record.refinement.reset();
+  record.deviation.reset();
+  const std::string text = to_json(record);
+  EXPECT_THAT(text, Not(HasSubstr("\"graph\"")));
+  EXPECT_THAT(text, Not(HasSubstr("\"refinement\"")));
+  EXPECT_THAT(text, Not(HasSubstr("\"deviation\"")));
+}
+
+TEST(RunRecord, WritesNullForWhatIsNoNumber) {
+  RunRecord record = example();
+  record.scans[0].noise_sigma = std::numeric_limits<double>::quiet_NaN();
+  record.deviation->rms = std::numeric_limits<double>::infinity();
+  const std::string text = to_json(record);
+  EXPECT_THAT(text, HasSubstr("\"noise_sigma\": null"));
+  EXPECT_THAT(text, HasSubstr("\"rms\": null"));
+}
+
+TEST(RunRecord, IsNotReadFromAnythingElse) {
+  for (const char* text : {"", "{", "[]", "{}", R"({"asbuilt": {"version": "1", "schema": 2}})",
+                           R"({"asbuilt": {"version": 1, "schema": 1}})"}) {
+    const auto record = run_record_from_json(text, "some/result.json");
+    ASSERT_FALSE(record.has_value()) << text;
+    EXPECT_EQ(record.error().code, ErrorCode::unreadable_input);
+    EXPECT_THAT(record.error().message, HasSubstr("some/result.json"));
+  }
+}
+
+TEST(SegmentFile, KeepsHarmlessNamesAndMendsOthers) {
+  EXPECT_EQ(segment_file(7, "scan_07").generic_string(), "segments/007_scan_07.ply");
+  EXPECT_EQ(segment_file(1234, "../a b").generic_string(), "segments/1234_.._a_b.ply");
+}
+
+}  // namespace
+}  // namespace asbuilt::io
