@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+namespace asbuilt::cli {
+namespace {
+
+using pipeline::Half;
+
+constexpr const char* kHelpGroup = "When detection needs help";
+
+std::string group_of(Half half) {
+  switch (half) {
+    case Half::model:
+      return "The model";
+    case Half::scan:
+      return "Each scan: preparation, detection, verification";
+    case Half::joint:
+      return "All scans: graph, refinement, fusion, inspection";
+  }
+  return {};
+}
+
+void add_scan_options(CLI::App& command, pipeline::Options& options) {
+  add_unit_option(command, "--scan-unit", options.scan_unit, "Unit of the scans: mm, cm, m, inch or foot");
+  command
+      .add_option("--viewpoint", options.viewpoint,
+                  "Where the sensor stood, in the scan's coordinates: auto, none, x,y,z, dir:dx,dy,dz, or a CSV file "
+                  "with rows SCAN,x,y,z")
+      ->capture_default_str();
+  command.add_option("--poses", options.poses, "Poses to start from: CSV rows SCAN,a11,...,a44, or JSON")
+      ->group(kHelpGroup);
+}
+
+void add_choices_about_scans(CLI::App& command, pipeline::Options& options) {
+  command.add_option("--exclude", options.exclude, "A scan to leave out; may be given several times")
+      ->allow_extra_args(false)
+      ->group(kHelpGroup);
+  command
+      .add_option("--accept", options.accept,
+                  "SCAN:CANDIDATE, a candidate that you vouch for (asbuilt explain lists them)")
+      ->allow_extra_args(false)
+      ->group(kHelpGroup);
+}
+
+void add_joint_options(CLI::App& command, pipeline::Options& options) {
+  command.add_flag("--mesh", options.mesh, "Also write mesh.ply, a surface mesh");
+  command
+      .add_option_function<std::string>(
+          "--gauge",
+          [&options](const std::string& name) {
+            options.gauge = name == "fixed" ? pipeline::Gauge::fixed : pipeline::Gauge::best_fit;
+          },
+          "How the whole is brought into the model frame: best_fit or fixed (to the fixed scan)")
+      ->check(CLI::IsMember({"best_fit", "fixed"}))
+      ->default_str("best_fit");
+  add_tolerance_option(command, options);
+}
+
+}  // namespace
+
+std::string flag_of(const std::string& field) {
+  std::string flag = "--" + field;
+  std::ranges::replace(flag, '_', '-');
+  return flag;
+}
+
+void add_unit_option(CLI::App& command, const std::string& name, io::Unit& unit, const std::string& help) {
+  command.add_option_function<std::string>(
+      name,
+      [&unit, name](const std::string& text) {
+        const auto parsed = io::unit_from_name(text);
+        if (!parsed) throw CLI::ValidationError(name, parsed.error().message);
+        unit = *parsed;
+      },
+      help + " (as the file states, else mm)");
+}
+
+void add_tolerance_option(CLI::App& command, pipeline::Options& options) {
+  command.add_option_function<std::string>(
+      "--tolerance",
+      [&options](const std::string& text) {
+        inspect::Tolerance tolerance;
+        const char* const end = text.data() + text.size();
+        const auto low = std::from_chars(text.data(), end, tolerance.low_mm);
+        const bool comma = low.ec == std::errc() && low.ptr != end && *low.ptr == ',';
+        const auto high = comma ? std::from_chars(low.ptr + 1, end, tolerance.high_mm) : low;
+        if (!comma || high.ec != std::errc() || high.ptr != end) {
+          throw CLI::ValidationError("--tolerance", fmt::format("found '{}', expected LOW,HIGH in mm, for example "
+                                                                "-0.5,0.5",
+                                                                text));
+        }
+        options.inspect.tolerance = tolerance;
+      },
+      "LOW,HIGH in mm: deviations that the drawing allows; exit code 6 when they are exceeded");
+}
+
+void add_common_options(CLI::App& command, Shell& shell, bool has_output) {
+  CommonOptions& common = shell.common;
+  constexpr const char* kGroup = "Common";
+  command.add_option("--threads", common.threads, "Threads to use (0: all cores)")
+      ->check(CLI::Range(0, 1024))
+      ->group(kGroup);
+  command.add_option("--memory", common.memory_gb, "Gigabytes to use at most; what needs more fails (0: no limit)")
+      ->check(CLI::NonNegativeNumber)
+      ->group(kGroup);
+  command.add_flag("-q,--quiet", common.quiet, "No progress and no summary")->group(kGroup);
+  command.add_flag("--json", common.json, "The result as JSON on standard output")->group(kGroup);
+  if (has_output) {
+    command.add_flag("--force", common.force, "Write into an existing folder, and start anew")->group(kGroup);
+  }
+  // Read before the other options (see config.cpp); listed here for --help.
+  command.add_option("--config", "TOML file with any of these options")->group(kGroup)->expected(1);
+}
+
+void add_pipeline_options(CLI::App& command, pipeline::Options& options, std::initializer_list<Half> halves) {
+  const auto wanted = [&](Half half) { return std::ranges::find(halves, half) != halves.end(); };
+  if (wanted(Half::model)) {
+    add_unit_option(command, "--unit", options.model_unit, "Unit of the model: mm, cm, m, inch or foot");
+  }
+  if (wanted(Half::scan)) add_scan_options(command, options);
+  if (wanted(Half::scan) || wanted(Half::joint)) {
+    add_choices_about_scans(command, options);
+    command.add_flag("--paper-mode", options.paper_mode, "Exactly the published method");
+    command.add_option("--seed", options.seed, "Seed of all random choices")->capture_default_str();
+  }
+  if (wanted(Half::joint)) add_joint_options(command, options);
+  pipeline::for_each_stage_field(options, [&](Half half, const std::string& name, auto& value, std::string_view help) {
+    if (wanted(half)) add_field(command, name, value, std::string(help), group_of(half));
+  });
+}
+
+}  // namespace asbuilt::cli

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+. "$(dirname "$0")/common.sh"
+small_scene
+model=scene/model.ply
+scans="scene/scan_00.ply scene/scan_01.ply scene/scan_02.ply"
+
+# ---- the same bytes whatever the thread count
+for threads in 1 2 3; do
+  # shellcheck disable=SC2086
+  expect 0 reconstruct "$model" $scans -o "r$threads" --threads $threads --json
+  cp stdout "stdout$threads"
+  same "stdout$threads" "r$threads/result.json"
+done
+for file in result.json reconstruction.ply report.json; do
+  same "r1/$file" "r2/$file"
+  same "r1/$file" "r3/$file"
+done
+
+# ---- detect, then register: the same as reconstruct
+# shellcheck disable=SC2086
+expect 0 detect "$model" $scans -o detected
+expect 0 register detected -o registered
+for file in result.json reconstruction.ply report.json; do same "r1/$file" "registered/$file"; done
+for file in r1/segments/*; do same "$file" "registered/segments/$(basename "$file")"; done
+
+# ---- spread over runs, the scans come together again
+i=0
+for scan in $scans; do
+  expect 0 detect "$model" "$scan" -o "part$i"
+  i=$((i + 1))
+done
+expect 0 register part0 part1 part2 -o spread
+same r1/reconstruction.ply spread/reconstruction.ply
+
+# ---- a prepared model stands wherever the model does
+expect 0 prepare "$model" -o part.asbuilt
+expect 0 info part.asbuilt --json
+grep -q '"kind": "prepared"' stdout || fail "info does not know a prepared model"
+expect 0 detect part.asbuilt scene/scan_00.ply -o from_prepared
+sed 's/part.asbuilt/scene\/model.ply/' from_prepared/result.json >renamed.json
+same part0/result.json renamed.json
+
+# ---- tolerance: 6 when it is exceeded
+expect 6 register detected -o tight --tolerance -0.0001,0.0001
+expect 6 inspect "$model" r1/reconstruction.ply -o tight_report --tolerance -0.0001,0.0001
+expect 0 inspect "$model" r1/reconstruction.ply -o report --tolerance -5,5 --json
+same stdout report/report.json
+grep -q '"verdict": "pass"' report/report.json || fail "the verdict is not pass"
+
+# ---- the user's own choices are carried out and written down
+"$asbuilt" register detected -o without --exclude scan_01 >/dev/null 2>stderr
+[ "$(field_of without scan_01 reason_code)" = excluded ] || fail "--exclude was not carried out"
+grep -q '"joint_exclude": \["scan_01"\]' without/result.json || fail "--exclude was not written down"
+expect 2 register detected -o nobody --exclude nobody
+absent nobody
+expect 0 detect "$model" scene/scan_00.ply -o vouched --accept scan_00:0
+[ "$(field_of vouched scan_00 reason_code)" = accepted_by_user ] || fail "--accept was not written down"
+
+# ---- words and figures
+expect 0 explain r1
+grep -q 'scan_00 .* is accepted' stdout || fail "explain does not say what became of a scan"
+expect 0 explain r1 scan_01
+grep -q scan_00 stdout && grep -q '^scan_00' stdout && fail "explain speaks of a scan nobody asked for"
+expect 2 explain r1 nobody
+expect 0 evaluate scene r1 --json
+grep -q '"wrong": 0' stdout || fail "a wrong pose was accepted"
+expect 0 info r1 "$model" scene/scan_00.ply --json
+for kind in result mesh scan; do grep -q "\"kind\": \"$kind\"" stdout || fail "info knows no $kind"; done
+grep -qi 'nan\|inf' r1/result.json r1/report.json && fail "a number that JSON does not know was written"
+echo passed

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "asbuilt/evaluate/evaluate.h"
+#include "asbuilt/io/file.h"
+#include "asbuilt/pipeline.h"
+#include "asbuilt/simulate/simulate.h"
+#include "support/parts.h"
+
+namespace asbuilt {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Scenes of a virtual scanner on disk, and where their results go.
+class Reconstruct : public testing::Test {
+ protected:
+  Reconstruct()
+      : base_(fs::path(testing::TempDir()) / "asbuilt_e2e" /
+              testing::UnitTest::GetInstance()->current_test_info()->name()) {
+    fs::remove_all(base_);
+  }
+  ~Reconstruct() override { fs::remove_all(base_); }
+
+  void simulate_scenes(simulate::SimulateOptions options) {
+    options.points = 40000;
+    const auto simulation = simulate::simulate(test::casing(), options, Context(2));
+    ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
+    const auto written = simulate::write_simulation(scenes(), *simulation);
+    ASSERT_TRUE(written.has_value()) << written.error().message;
+    for (const auto& scan : simulation->scans) scans_.push_back((scenes() / (scan.name + ".ply")).string());
+  }
+
+  [[nodiscard]] fs::path scenes() const { return base_ / "scenes"; }
+  [[nodiscard]] fs::path result() const { return base_ / "result"; }
+
+  [[nodiscard]] Result<io::RunRecord> reconstruct(const pipeline::Options& options = {}) const {
+    return pipeline::reconstruct((scenes() / "model.ply").string(), scans_, options, {result(), false, {}}, Context(2));
+  }
+
+  [[nodiscard]] evaluate::Evaluation evaluated() const {
+    return evaluate::evaluate(scenes() / "truth.json", result(), {}, Context(2)).value();
+  }
+
+  fs::path base_;
+  std::vector<std::string> scans_;
+};
+
+TEST_F(Reconstruct, BringsClutteredScansTogetherWithinHalfASigma) {
+  simulate_scenes({.scans = 6, .seed = 11, .as_built = {}});
+  const auto record = reconstruct();
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  const evaluate::Evaluation figures = evaluated();
+  EXPECT_EQ(figures.wrong, 0U) << evaluate::to_table(figures);
+  EXPECT_GE(figures.right, 5U) << evaluate::to_table(figures);
+  // style.md, section 8: within half a sigma after the common gauge.
+  EXPECT_LE(figures.relative_pose_error_sigma.value(), 0.5) << evaluate::to_table(figures);
+}
+
+TEST_F(Reconstruct, AcceptsNothingWhereThePartIsAbsent) {
+  simulate_scenes({.scans = 4, .seed = 12, .absent_share = 1.0, .decoys = 1, .as_built = {}});
+  const auto record = reconstruct();
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  for (const io::ScanRecord& scan : record->scans) {
+    EXPECT_NE(scan.status, io::ScanStatus::accepted) << scan.name << ": " << scan.reason;
+    EXPECT_FALSE(scan.reason_code.empty());
+    EXPECT_FALSE(scan.reason.empty());
+  }
+  EXPECT_EQ(record->state, io::RunState::failed);
+  EXPECT_FALSE(fs::exists(result() / "reconstruction.ply"));
+}
+
+TEST_F(Reconstruct, StopsWhenAskedAndGoesOnToTheSameBytes) {
+  simulate_scenes({.scans = 2, .seed = 13, .as_built = {}});
+  std::stop_source source;
+  Context context(2);
+  context.stop = source.get_token();
+  pipeline::Output output{result(), false, {}};
+  output.on_stage = [&](std::string_view stage, std::string_view scan) {
+    if (stage == "verify" && scan == "scan_01") source.request_stop();
+  };
+  const auto model = (scenes() / "model.ply").string();
+  const auto stopped = pipeline::reconstruct(model, scans_, {}, output, context);
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  const auto partial = io::read_run_record(result() / "result.json");
+  ASSERT_TRUE(partial.has_value());
+  EXPECT_EQ(partial->state, io::RunState::partial);
+  EXPECT_EQ(partial->scans.size(), 1U);
+
+  ASSERT_TRUE(reconstruct().has_value());
+  const auto resumed = io::read_file(result() / "result.json");
+  fs::remove_all(result());
+  ASSERT_TRUE(reconstruct().has_value());
+  EXPECT_EQ(io::read_file(result() / "result.json").value(), resumed.value());
+}
+
+}  // namespace
+}  // namespace asbuilt

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "unit/io/bytes.h"
+
+namespace asbuilt::test {
+
+/// A small valid file: where fuzzing starts, and what hostile input is made from.
+struct Seed {
+  std::string family;  ///< the fuzz target that reads it
+  std::string name;    ///< with the extension that tells its kind
+  std::string content;
+  std::size_t points = 0;
+  bool is_mesh = false;
+  bool declares_count = true;  ///< otherwise a file cut at the end of a line looks like a whole one
+};
+
+inline std::string ply_seed(const std::string& format) {
+  return "ply\nformat " + format +
+         " 1.0\ncomment seed\nelement camera 1\nproperty list uchar short size\nelement vertex 4\nproperty double x\n"
+         "property float y\nproperty short z\nproperty float nx\nproperty float ny\nproperty float nz\n"
+         "element face 2\nproperty uchar flag\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
+inline std::string ply_binary_seed(bool is_big) {
+  std::string content = ply_seed(is_big ? "binary_big_endian" : "binary_little_endian");
+  const auto put = [&](auto value) { content += is_big ? big(value) : little(value); };
+  put(std::uint8_t{2}), put(std::int16_t{3}), put(std::int16_t{4});
+  for (const int i : {0, 1, 2, 3}) {
+    put(0.5 * i), put(static_cast<float>(i % 2)), put(static_cast<std::int16_t>(i));
+    for (const float n : {0.f, 0.f, 1.f}) put(n);
+  }
+  put(std::uint8_t{1}), put(std::uint8_t{3});
+  for (const std::int32_t i : {0, 1, 2}) put(i);
+  put(std::uint8_t{0}), put(std::uint8_t{4});
+  for (const std::int32_t i : {0, 1, 2, 3}) put(i);
+  return content;
+}
+
+inline std::string ply_ascii_seed() {
+  return ply_seed("ascii") +
+         "2 3 4\n0 0 0 0 0 1\n0.5 1 1 0 0 1\n1 0 2 0 0 1\n1.5e0 1 3 0 0 1\n1 3 0 1 2\n0 4 0 1 2 3\n";
+}
+
+inline std::string pcd_head(const std::string& data) {
+  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z flag\nSIZE 4 4 8 1\nTYPE F F F U\nCOUNT 1 1 1 2\nWIDTH 2\nHEIGHT 2\n"
+         "VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 4\nDATA " +
+         data + "\n";
+}
+
+inline std::string pcd_binary_seed() {
+  std::string content = pcd_head("binary");
+  for (const int i : {0, 1, 2, 3}) content += little(static_cast<float>(i)) + little(1.5f) + little(-2.0 * i) + "\1\2";
+  return content;
+}
+
+/// Four points as LZF: literals, and a repetition where the data repeat.
+inline std::string pcd_compressed_seed() {
+  std::string stream = "\x0f";
+  for (const int i : {0, 1, 2, 3}) stream += little(static_cast<float>(i));
+  stream += '\x03' + little(1.5f);
+  stream += std::string("\xe0\x03\x03", 3);  // 7 + 3 + 2 = 12 bytes from 4 back: 1.5f three times
+  stream += '\x1f';
+  for (const int i : {0, 1, 2, 3}) stream += little(-2.0 * i);
+  stream += std::string("\x07\1\2\1\2\1\2\1\2", 9);
+  return pcd_head("binary_compressed") + little(static_cast<std::uint32_t>(stream.size())) + little(std::uint32_t{72}) +
+         stream;
+}
+
+inline std::string stl_binary_seed() {
+  std::string content = "solid seed" + std::string(70, ' ') + little(std::uint32_t{2});
+  for (const float z : {0.f, 1.f}) {
+    for (const float value : {0.f, 0.f, 1.f, 0.f, 0.f, z, 1.f, 0.f, z, 0.f, 1.f, z}) content += little(value);
+    content += little(std::uint16_t{0});
+  }
+  return content;
+}
+
+inline std::vector<Seed> seeds() {
+  return {
+      {"ply", "ascii.ply", ply_ascii_seed(), 4, true, true},
+      {"ply", "little.ply", ply_binary_seed(false), 4, true, true},
+      {"ply", "big.ply", ply_binary_seed(true), 4, true, true},
+      {"pcd", "ascii.pcd", pcd_head("ascii") + "0 1.5 -0 1 2\n1 1.5 -2 1 2\nnan 1.5 -4 1 2\n3 1.5 -6 1 2\n", 4, false,
+       true},
+      {"pcd", "binary.pcd", pcd_binary_seed(), 4, false, true},
+      {"pcd", "compressed.pcd", pcd_compressed_seed(), 4, false, true},
+      {"text", "blanks.xyz", "# seed\n1 2 3\n4.5 -5 6e1\n7\t8 nan\n", 3, false, false},
+      {"text", "normals.asc", "//X Y Z Nx Ny Nz\n1 2 3 0 0 1\n4 5 6 0 1 0\n", 2, false, false},
+      {"text", "counted.pts", "3\n1 2 3 0.5 10 20 30\n4 5 6 0.5 10 20 30\n7 8 9 0.5 10 20 30\n", 3, false, true},
+      {"text", "blocks.pts", "1\n1 2 3 0.5\n2\n4 5 6 0.5\n7 8 9 0.5\n", 3, false, false},
+      {"text", "header.csv", "x;y;z;name\n1,5;2;3;0\n4000000,25;5;;0\n", 2, false, false},
+      {"mesh", "binary.stl", stl_binary_seed(), 6, true, true},
+      {"mesh", "ascii.stl",
+       "solid seed\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+       "0\nendloop\nendfacet\nendsolid "
+       "seed\n",
+       3, true, true},
+      {"mesh", "quad.off", "OFF # seed\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n", 4, true, true},
+      {"mesh", "quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 -2//1 \\\n 4//1\n", 4, true,
+       false},
+      {"pose", "poses.csv", "name,matrix\na,0,-1,0,1,1,0,0,2,0,0,1,3,0,0,0,1\n"},
+      {"pose", "poses.json", R"([{"scan": "a", "model_from_scan": [[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]}])"},
+      {"pose", "viewpoints.csv", "name,x,y,z\na,1,2,3\nb,4,5,6\n"},
+  };
+}
+
+}  // namespace asbuilt::test

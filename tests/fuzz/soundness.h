@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "asbuilt/core/result.h"
+#include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/io/readers.h"
+
+namespace asbuilt::test {
+
+inline void require(bool condition, const std::string& what) {
+  if (!condition) throw std::runtime_error("a reader broke its promise: " + what);
+}
+
+template <class T>
+void require_sound_error(const Result<T>& result) {
+  require(result.error().code == ErrorCode::unreadable_input, "the code of the error");
+  require(result.error().message.size() < 2000, "an error of one sentence");
+  for (const char c : result.error().message) require(c >= ' ' && c <= '~', "an error that can be printed");
+}
+
+/// What holds for any input whatsoever: an error, or values that keep their invariants.
+inline void require_sound(const Result<std::vector<io::ScanFile>>& scans) {
+  if (!scans) return require_sound_error(scans);
+  require(!scans->empty(), "at least one scan");
+  for (const io::ScanFile& scan : *scans) {
+    require(!scan.cloud.empty(), "no scan without points");
+    require(!scan.cloud.has_normals() || scan.cloud.normals.size() == scan.cloud.size(), "a normal for each point");
+    require(!scan.viewpoint_mm || scan.viewpoint_mm->allFinite(), "a finite viewpoint");
+    require(scan.offset_mm.allFinite(), "a finite offset");
+  }
+}
+
+inline void require_sound(const Result<TriangleMesh>& mesh) {
+  if (!mesh) return require_sound_error(mesh);
+  require(!mesh->empty(), "at least one triangle");
+  const auto count = static_cast<int>(mesh->vertices.size());
+  for (const Eigen::Vector3i& triangle : mesh->triangles) {
+    require(triangle.minCoeff() >= 0 && triangle.maxCoeff() < count, "triangles of vertices that exist");
+  }
+}
+
+inline void require_sound(const Result<std::vector<io::NamedPose>>& poses) {
+  if (!poses) return require_sound_error(poses);
+  for (const io::NamedPose& pose : *poses) require(is_rigid(pose.model_from_scan.matrix(), 1e-9), "rigid poses");
+}
+
+inline void require_sound(const Result<std::vector<io::NamedViewpoint>>& viewpoints) {
+  if (!viewpoints) return require_sound_error(viewpoints);
+  for (const io::NamedViewpoint& viewpoint : *viewpoints) {
+    require(viewpoint.viewpoint_mm.allFinite(), "finite viewpoints");
+  }
+}
+
+/// Reads a content as the file of this name, in every way in which it can be read.
+inline void read_in_every_way(const std::string& name, std::string_view content) {
+  const io::Input input{name, content};
+  require_sound(io::scans_from(name, input, io::Unit::metre));
+  require_sound(io::mesh_from(name, input, io::Unit::inch));
+  require_sound(io::poses_from(input, io::Unit::stated));
+  require_sound(io::viewpoints_from(input, io::Unit::stated));
+}
+
+}  // namespace asbuilt::test
