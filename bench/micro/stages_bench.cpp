@@ -10,6 +10,9 @@
 #include "asbuilt/detect/detect.h"
 #include "asbuilt/inspect/deviation.h"
 #include "asbuilt/refine/refine.h"
+#include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/verdict.h"
+#include "asbuilt/verify/verify.h"
 #include "scene.h"
 
 namespace asbuilt::bench {
@@ -59,6 +62,35 @@ void BM_Voting(benchmark::State& state) {
   }
 }
 BENCHMARK(BM_Voting)->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+// Sparse LM-ICP of one hypothesis, from a displacement of some 2 % of the diameter to convergence (Sec. 3.1).
+void BM_SparseLmIcp(benchmark::State& state) {
+  const model::PreparedModel& model = scene().model;
+  const scan::Scan& scan = scene().scan;
+  std::vector<Eigen::Vector3f> points;
+  const std::size_t wanted = static_cast<std::size_t>(state.range(0));
+  for (std::size_t k = 0; k < wanted; ++k) points.push_back(scan.cloud.positions[k * scan.cloud.size() / wanted]);
+  Vector6d push;
+  push << 0.02, -0.015, 0.01, 2.0, -3.0, 2.5;
+  const Pose start = pose_from_twist(push) * scene().model_from_scan;
+  const verify::LmIcpOptions options{model.sampling_distance, 30, true};
+  verify::LmIcpResult result;
+  for (auto _ : state) result = verify::lm_icp(points, start, model, scan.viewpoint, options);
+  state.counters["iterations"] = result.iterations;
+  state.counters["displacement_mm"] =
+      verify::displacement_mm(result.model_from_scan, scene().model_from_scan, model);
+}
+BENCHMARK(BM_SparseLmIcp)->ArgName("points")->Arg(300)->Arg(1000)->Unit(benchmark::kMicrosecond);
+
+void BM_Verify(benchmark::State& state) {
+  const Context context(static_cast<int>(state.range(0)));
+  const auto hypotheses = detect::find_hypotheses(scene().scan, *scene().codebook, {}, context);
+  if (!hypotheses) return state.SkipWithError(hypotheses.error().message.c_str());
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(verify::verify(scene().scan, scene().model, *hypotheses, {}, context));
+  }
+}
+BENCHMARK(BM_Verify)->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 // Three views of the part from 35 degrees apart, started 1 mm and 0.2 degrees off.
 void BM_Refine(benchmark::State& state) {

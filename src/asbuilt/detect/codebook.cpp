@@ -84,6 +84,36 @@ void fill_entries(Codebook& book, const std::vector<std::uint32_t>& bins) {
   }
 }
 
+// One pair is one witness: where the model repeats itself, as planes and cylinders do, several entries of a bucket
+// would vote for one (m, alpha). Of those with the same reference and nearly the same angle one remains.
+void merge_repetitions(Codebook& book, int alpha_bins, const Context& context) {
+  const std::size_t bins = book.quantisation.bin_count();
+  const auto sector = [&](const Codebook::Entry& entry) {
+    return (static_cast<std::uint32_t>(entry.angle) * static_cast<std::uint32_t>(alpha_bins)) >> 16;
+  };
+  std::vector<std::uint32_t> remaining(bins);
+  parallel_for(context, bins, 256, [&](std::size_t b) {
+    const auto begin = book.entries.begin() + book.offsets[b], end = book.entries.begin() + book.offsets[b + 1];
+    std::sort(begin, end, [](const Codebook::Entry& x, const Codebook::Entry& y) {
+      return x.reference != y.reference ? x.reference < y.reference : x.angle < y.angle;
+    });
+    const auto last = std::unique(begin, end, [&](const Codebook::Entry& x, const Codebook::Entry& y) {
+      return x.reference == y.reference && sector(x) == sector(y);
+    });
+    remaining[b] = static_cast<std::uint32_t>(last - begin);
+  });
+  std::uint32_t next = 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    const auto begin = book.entries.begin() + book.offsets[b];
+    std::copy(begin, begin + remaining[b], book.entries.begin() + next);
+    book.offsets[b] = next;
+    next += remaining[b];
+  }
+  book.offsets[bins] = next;
+  book.entries.resize(next);
+  book.entries.shrink_to_fit();
+}
+
 // With 1 / N_b a handful of rare features, as likely clutter as part, outvotes everything else; see docs/detect.md.
 std::vector<float> bucket_weights(const Codebook& book, double exponent) {
   std::vector<float> weights(book.quantisation.bin_count(), 0.0F);
@@ -150,6 +180,7 @@ Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedMode
   book->quantisation.distance_bins =
       static_cast<int>(book->longest_pair / static_cast<double>(book->quantisation.distance_step)) + 1;
   fill_entries(*book, pair_bins(*book, context));
+  if (!options.paper_mode) merge_repetitions(*book, options.alpha_bins, context);
   book->bucket_weight = bucket_weights(*book, options.bucket_weight_exponent);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while building the codebook");
   book->largest_voting_bucket = options.paper_mode

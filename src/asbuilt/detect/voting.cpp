@@ -19,7 +19,6 @@ std::uint16_t fraction_of_turn(float angle) {
 LocalVoting::LocalVoting(const Codebook& codebook, const Scene& scene, const DetectOptions& options)
     : codebook_(codebook), scene_(scene), options_(options) {
   votes_.resize(codebook.samples.size() * static_cast<std::size_t>(options.alpha_bins));
-  if (!options.paper_mode) voter_.resize(votes_.size());
 }
 
 void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector3f& reference_normal,
@@ -32,35 +31,21 @@ void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector
   const std::uint16_t angle = fraction_of_turn(scene_angle);
   // p(f_k | f) = 1 / K: K is what the options say, also where a neighbour does not exist.
   const float feature_weight = 1.0F / static_cast<float>(options_.paper_mode ? options_.neighbour_bins : bins.count);
-  if (++pair_ == 0) {
-    std::ranges::fill(voter_, std::uint16_t{0});
-    pair_ = 1;
-  }
   for (int k = 0; k < bins.count; ++k) {
     const std::span<const Codebook::Entry> bucket = codebook_.bucket(bins.bin[static_cast<std::size_t>(k)]);
     if (bucket.empty() || bucket.size() > codebook_.largest_voting_bucket) continue;
     const float weight = feature_weight * codebook_.bucket_weight[bins.bin[static_cast<std::size_t>(k)]];
-    if (options_.paper_mode) {
-      for (const Codebook::Entry& entry : bucket) {
-        const auto alpha = static_cast<std::uint16_t>(angle - entry.angle);
-        votes_[entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16)] += weight;
-      }
-      continue;
-    }
+    float* const votes = votes_.data();
     for (const Codebook::Entry& entry : bucket) {
       const auto alpha = static_cast<std::uint16_t>(angle - entry.angle);
-      const std::uint32_t cell = entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16);
-      // One pair is one witness: it must not vote twice for a cell because the model repeats itself there.
-      votes_[cell] += voter_[cell] == pair_ ? 0.0F : weight;
-      voter_[cell] = pair_;
+      votes[entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16)] += weight;
     }
+    cast_ += bucket.size();
   }
 }
 
 std::vector<Peak> LocalVoting::vote(std::uint32_t reference, float sign) {
   std::ranges::fill(votes_, 0.0F);
-  std::ranges::fill(voter_, std::uint16_t{0});
-  pair_ = 0;
   const Eigen::Vector3f point = scene_.samples.positions[reference];
   const Eigen::Vector3f normal = sign * scene_.samples.normals[reference];
   const Pose frame = local_frame(point, normal);
@@ -85,23 +70,26 @@ std::vector<Peak> LocalVoting::peaks(const Pose& scene_frame, const Eigen::Vecto
   const bool smooth = !options_.paper_mode;
   const Eigen::Vector3d towards_sensor = scene_.viewpoint.towards_sensor(reference.cast<double>());
   const bool check_view = scene_.viewpoint.known() && !codebook_.seen_from.empty();
+  const auto count = static_cast<std::size_t>(bins);
+  std::vector<float> around(count + 2), values(count);
   std::vector<Peak> best_of_sample;
   for (std::size_t m = 0; m < codebook_.samples.size(); ++m) {
-    const float* row = votes_.data() + m * static_cast<std::size_t>(bins);
-    // A true alpha near a border splits its votes over two bins; neighbours are counted at half.
-    const auto value = [&](int bin) {
-      const int wrapped = (bin + bins) % bins;
-      return row[wrapped] + (smooth ? 0.5F * (row[(wrapped + bins - 1) % bins] + row[(wrapped + 1) % bins]) : 0.0F);
-    };
-    int best = 0;
-    for (int bin = 1; bin < bins; ++bin) {
-      if (value(bin) > value(best)) best = bin;
+    const float* row = votes_.data() + m * count;
+    std::copy(row, row + count, values.begin());
+    if (smooth) {
+      // A true alpha near a border splits its votes over two bins; neighbours are counted at half.
+      std::copy(row, row + count, around.begin() + 1);
+      around.front() = row[count - 1];
+      around.back() = row[0];
+      for (std::size_t bin = 0; bin < count; ++bin) values[bin] += 0.5F * (around[bin] + around[bin + 2]);
     }
-    const float height = value(best);
+    const auto best = static_cast<int>(std::ranges::max_element(values) - values.begin());
+    const float height = values[static_cast<std::size_t>(best)];
     if (!(height > 0.0F)) continue;
     float shift = 0.0F;
     if (smooth) {
-      const float left = value(best - 1), right = value(best + 1);
+      const float left = values[static_cast<std::size_t>((best + bins - 1) % bins)];
+      const float right = values[static_cast<std::size_t>((best + 1) % bins)];
       const float curvature = left - 2.0F * height + right;
       if (curvature < 0.0F) shift = std::clamp(0.5F * (left - right) / curvature, -0.5F, 0.5F);
     }

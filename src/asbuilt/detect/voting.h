@@ -35,6 +35,8 @@ class LocalVoting {
   /// V(m, alpha) = sum_i p(m, alpha | s_r, s_i) (Eq. 7-10), best first.
   [[nodiscard]] std::vector<Peak> vote(std::uint32_t reference, float sign);
 
+  [[nodiscard]] std::uint64_t votes_cast() const { return cast_; }  ///< since it was made
+
  private:
   void add_pair(const Eigen::Vector3f& reference, const Eigen::Vector3f& reference_normal, const Eigen::Vector3f& other,
                 const Eigen::Vector3f& other_normal, float scene_angle);
@@ -43,9 +45,8 @@ class LocalVoting {
   const Codebook& codebook_;
   const Scene& scene_;
   DetectOptions options_;  // a copy: callers pass temporaries
-  std::vector<float> votes_;          // [model sample][alpha bin]
-  std::vector<std::uint16_t> voter_;  // the last pair that voted for a cell
-  std::uint16_t pair_ = 0;
+  std::vector<float> votes_;  // [model sample][alpha bin]
+  std::uint64_t cast_ = 0;
 };
 
 }  // namespace asbuilt::detect

@@ -48,6 +48,8 @@ DistanceField::Level::Level(const Eigen::AlignedBox3d& box, const SurfaceDistanc
     if (!context.cancelled()) fill_brick(brick, place_of[brick], surface);
   });
   parallel_for(context, place_of.size(), 64, [&](std::size_t brick) { copy_borders(brick, place_of[brick]); });
+  has_jump.resize(place_of.size());
+  parallel_for(context, place_of.size(), 64, [&](std::size_t brick) { has_jump[brick] = jumps_within(brick) ? 1 : 0; });
 }
 
 // Neighbours follow one another, to and fro, so that the nearest face of the last node is a good guess for the next.
@@ -85,6 +87,24 @@ void DistanceField::Level::copy_borders(std::size_t brick, std::size_t place) {
       }
     }
   }
+}
+
+// Along a cell's edge a true distance cannot change by more than the edge is long.
+bool DistanceField::Level::is_jump(float low, float high) const { return std::abs(high - low) > 1.001F * voxel; }
+
+bool DistanceField::Level::jumps_within(std::size_t brick) const {
+  const float* node = distance.data() + brick * kNodesPerBrick;
+  for (int z = 0; z < kBrickNodes; ++z) {
+    for (int y = 0; y < kBrickNodes; ++y) {
+      for (int x = 0; x < kBrickNodes; ++x) {
+        const float here = node[node_index({x, y, z})];
+        if (x > 0 && is_jump(node[node_index({x - 1, y, z})], here)) return true;
+        if (y > 0 && is_jump(node[node_index({x, y - 1, z})], here)) return true;
+        if (z > 0 && is_jump(node[node_index({x, y, z - 1})], here)) return true;
+      }
+    }
+  }
+  return false;
 }
 
 // The place of the brick in whose inside (or lower border) a node lies, if there is such a brick; else `place`.
@@ -132,14 +152,11 @@ bool DistanceField::Level::sample(const Eigen::Vector3f& point, Sample& result) 
   float c000 = d[0], c100 = d[1], c010 = d[kRow], c110 = d[kRow + 1];
   float c001 = d[kLayer], c101 = d[kLayer + 1], c011 = d[kLayer + kRow], c111 = d[kLayer + kRow + 1];
 
-  // Along a cell's edge a true distance cannot change by more than the edge is long.
-  const float steepest =
-      std::max({std::abs(c100 - c000), std::abs(c110 - c010), std::abs(c101 - c001), std::abs(c111 - c011),
-                std::abs(c010 - c000), std::abs(c110 - c100), std::abs(c011 - c001), std::abs(c111 - c101),
-                std::abs(c001 - c000), std::abs(c101 - c100), std::abs(c011 - c010), std::abs(c111 - c110)});
-  float sign = 1.0F;
-  if (steepest > 1.001F * voxel) {
-    sign = distance[nearest_node] < 0.0F ? -1.0F : 1.0F;
+  if (has_jump[static_cast<std::size_t>(index)] != 0 &&
+      (is_jump(c000, c100) || is_jump(c010, c110) || is_jump(c001, c101) || is_jump(c011, c111) ||
+       is_jump(c000, c010) || is_jump(c100, c110) || is_jump(c001, c011) || is_jump(c101, c111) ||
+       is_jump(c000, c001) || is_jump(c100, c101) || is_jump(c010, c011) || is_jump(c110, c111))) {
+    const float sign = distance[nearest_node] < 0.0F ? -1.0F : 1.0F;
     for (float* corner : {&c000, &c100, &c010, &c110, &c001, &c101, &c011, &c111}) *corner = sign * std::abs(*corner);
   }
 

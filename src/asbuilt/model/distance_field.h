@@ -54,12 +54,15 @@ class DistanceField {
     std::vector<std::int32_t> brick_at;  // per place: index of its brick or -1; x runs fastest
     std::vector<float> distance;         // kNodesPerBrick a brick; x runs fastest
     std::vector<std::int32_t> triangle;
+    std::vector<std::uint8_t> has_jump;  // per brick: whether the sign jumps within it though the surface is not near
 
     Level() = default;
     Level(const Eigen::AlignedBox3d& box, const SurfaceDistance& surface, double voxel_mm, double band_mm,
           const Context& context);
     void fill_brick(std::size_t brick, std::size_t place, const SurfaceDistance& surface);
     void copy_borders(std::size_t brick, std::size_t place);
+    [[nodiscard]] bool jumps_within(std::size_t brick) const;
+    [[nodiscard]] bool is_jump(float low, float high) const;
     [[nodiscard]] std::size_t owner_of(const Eigen::Array3i& node, std::size_t place) const;
     [[nodiscard]] Eigen::Vector3d corner_of(std::size_t place) const;
     [[nodiscard]] static std::size_t node_index(const Eigen::Array3i& node);

@@ -158,7 +158,8 @@ PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples
                           const ScanEvidence& scan, const EvidenceOptions& options) {
   const Judge judge(model_from_scan, model, scan, options);
   PoseEvidence sum;
-  for (std::size_t i = 0; i < samples.size(); ++i) judge.add(samples.positions[i], samples.normals[i], sum);
+  const std::size_t count = std::min(options.most_samples, samples.size());
+  for (std::size_t i = 0; i < count; ++i) judge.add(samples.positions[i], samples.normals[i], sum);
   return sum;
 }
 
@@ -166,8 +167,11 @@ double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan, con
                         double distance_mm, double max_angle, bool every_point) {
   constexpr float kFlat = 0.02F;
   const double min_cosine = std::cos(max_angle);
+  const Eigen::Vector3f centre = (model_from_scan.inverse() * model.box.center().eval()).cast<float>();
+  const auto radius = static_cast<float>(0.5 * model.diameter + distance_mm);
   std::size_t on_model = 0, agreeing = 0;
   for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
+    if ((scan.cloud.positions[i] - centre).squaredNorm() > radius * radius) continue;
     if (!every_point && scan.surface_variation[i] > kFlat) continue;
     const Eigen::Vector3d point = model_from_scan * scan.cloud.positions[i].cast<double>();
     const model::DistanceField::Sample sample = model.field->at(point.cast<float>());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,9 +58,10 @@ struct PoseEvidence {
 struct EvidenceOptions {
   double distance_mm = 1.0;  ///< tau_theta: across the surface
   double lateral_mm = 1.0;   ///< how far along the surface the next measurement may be
+  std::size_t most_samples = std::numeric_limits<std::size_t>::max();
 };
 
-/// Asks the scan about every one of `samples` (oriented, in the model frame).
+/// Asks the scan about every one of `samples` (oriented, in the model frame), or the first `most_samples` of them.
 [[nodiscard]] PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples,
                                         const model::PreparedModel& model, const ScanEvidence& scan,
                                         const EvidenceOptions& options);

@@ -2,6 +2,7 @@
 #include "asbuilt/verify/lm_icp.h"
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 
 #include "asbuilt/core/robust.h"
@@ -9,12 +10,58 @@
 namespace asbuilt::verify {
 namespace {
 
+constexpr float kAway = -0.1F;  // cosine of the incidence from which a wall is turned away from the sensor
+
 struct NormalEquations {
   Matrix6d information = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
   double cost = 0.0;
   double squared = 0.0;
   std::size_t inliers = 0;
+};
+
+// The lower triangle of the information, row by row: the inner loop's sums stay in one short array.
+class PackedInformation {
+ public:
+  void add(const Vector6d& derivative, double weight) {
+    std::size_t k = 0;
+    for (int row = 0; row < 6; ++row) {
+      const double weighted = weight * derivative[row];
+      for (int column = 0; column <= row; ++column) sum_[k++] += weighted * derivative[column];
+    }
+  }
+  [[nodiscard]] Matrix6d matrix() const {
+    Matrix6d full;
+    std::size_t k = 0;
+    for (int row = 0; row < 6; ++row) {
+      for (int column = 0; column <= row; ++column) full(row, column) = full(column, row) = sum_[k++];
+    }
+    return full;
+  }
+
+ private:
+  std::array<double, 21> sum_{};
+};
+
+// The sensor in the model frame of one pose: asks which walls are turned to it without a root per point.
+class SensorInModel {
+ public:
+  SensorInModel(const scan::Viewpoint& viewpoint, const Pose& model_from_scan, bool is_asked)
+      : kind_(is_asked ? viewpoint.kind : scan::Viewpoint::Kind::none) {
+    if (kind_ == scan::Viewpoint::Kind::point) place_ = (model_from_scan * viewpoint.value).cast<float>();
+    if (kind_ == scan::Viewpoint::Kind::direction) place_ = -(model_from_scan.linear() * viewpoint.value).cast<float>();
+  }
+
+  [[nodiscard]] bool sees(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
+    if (kind_ == scan::Viewpoint::Kind::none) return true;
+    const Eigen::Vector3f towards = kind_ == scan::Viewpoint::Kind::point ? Eigen::Vector3f(place_ - point) : place_;
+    const float along = normal.dot(towards);
+    return along > 0.0F || along * along < kAway * kAway * towards.squaredNorm();
+  }
+
+ private:
+  scan::Viewpoint::Kind kind_;
+  Eigen::Vector3f place_ = Eigen::Vector3f::Zero();  // position, or direction towards it
 };
 
 class Problem {
@@ -30,37 +77,33 @@ class Problem {
   // A point off the field costs as much as one beyond the robust scale: leaving must not pay.
   [[nodiscard]] NormalEquations evaluate(const Pose& pose) const {
     NormalEquations sum;
+    PackedInformation information;
+    const SensorInModel sensor(viewpoint_, pose, options_.only_facing);
     const double outlier_cost = loss_.value(loss_.scale * loss_.scale);
     const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     const Eigen::Vector3f translation = pose.translation().cast<float>();
     for (const Eigen::Vector3f& point : points_) {
       const Eigen::Vector3f moved = rotation * point + translation;
       const model::DistanceField::Sample sample = model_.field->at(moved);
-      if (!sample.known() || std::abs(sample.distance) >= loss_.scale || !faces_sensor(sample, pose, point)) {
+      if (!sample.known() || std::abs(sample.distance) >= loss_.scale ||
+          !sensor.sees(moved, model_.face_normals[static_cast<std::size_t>(sample.triangle)])) {
         sum.cost += outlier_cost;
         continue;
       }
       const FieldResidual r = field_residual(sample, moved.cast<double>(), pivot_);
       const double squared = r.value * r.value;
       const double weight = loss_.weight(squared);
-      sum.information.selfadjointView<Eigen::Lower>().rankUpdate(r.derivative, weight);
+      information.add(r.derivative, weight);
       sum.gradient += weight * r.value * r.derivative;
       sum.cost += loss_.value(squared);
       sum.squared += squared;
       ++sum.inliers;
     }
-    sum.information = sum.information.selfadjointView<Eigen::Lower>();
+    sum.information = information.matrix();
     return sum;
   }
 
  private:
-  [[nodiscard]] bool faces_sensor(const model::DistanceField::Sample& sample, const Pose& pose,
-                                  const Eigen::Vector3f& point) const {
-    if (!options_.only_facing || !viewpoint_.known()) return true;
-    const Eigen::Vector3f& normal = model_.face_normals[static_cast<std::size_t>(sample.triangle)];
-    return normal.cast<double>().dot(pose.linear() * viewpoint_.towards_sensor(point.cast<double>())) > -0.1;
-  }
-
   std::span<const Eigen::Vector3f> points_;
   const model::PreparedModel& model_;
   const scan::Viewpoint& viewpoint_;

@@ -10,6 +10,7 @@
 
 #include "asbuilt/core/option_check.h"
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/core/random.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/detect/large_planes.h"
 #include "asbuilt/verify/evidence.h"
@@ -30,7 +31,9 @@ struct Level {
   double spacing_mm;                      ///< of the scan points used
   std::array<double, 2> robust_scale_mm;  ///< of the two passes
   double score_distance_mm;
-  std::size_t survivors;  ///< candidates that reach the next level
+  std::size_t most_points;  ///< scan points that a registration takes, spread over the part
+  std::size_t most_samples;  ///< model samples that are asked for evidence, likewise
+  std::size_t survivors;     ///< candidates that reach the next level
   const PointCloud* model_samples;
   double contradiction_weight;  ///< a right pose has few contradictions, once it is precise
 };
@@ -51,35 +54,50 @@ std::vector<std::uint8_t> background(const scan::Scan& scan, const model::Prepar
 
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
   const double d = model.sampling_distance;
-  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 40, &model.samples, 1.0},
-           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 16, &model.samples, 2.0},
-           {0.3 * d,
-            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-            final_distance,
-            16,
-            &model.dense_samples,
-            kContradictionWeight}}};
+  return {
+      {{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
+       {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
+       {0.3 * d,
+        {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+        final_distance,
+        3000,
+        3000,
+        8,
+        &model.dense_samples,
+        kContradictionWeight}}};
 }
 
-// The scan points that may lie on the part at a pose.
+// In random order, so that the first few of any region are spread over it.
+std::vector<Eigen::Vector3f> shuffled(std::vector<Eigen::Vector3f> points) {
+  Random random(0, "registration points", points.size());
+  for (std::size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[random.below(i)]);
+  return points;
+}
+
+// The first `most` of the points that lie within `margin_mm` of the model's surface at a pose.
 std::vector<Eigen::Vector3f> points_around(const std::vector<Eigen::Vector3f>& points, const Pose& model_from_scan,
-                                           const model::PreparedModel& model, double margin_mm) {
+                                           const model::PreparedModel& model, double margin_mm, std::size_t most) {
   const Eigen::Vector3f centre = (model_from_scan.inverse() * model.box.center().eval()).cast<float>();
   const auto radius = static_cast<float>(0.5 * model.diameter + margin_mm);
+  const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
+  const Eigen::Vector3f translation = model_from_scan.translation().cast<float>();
   std::vector<Eigen::Vector3f> around;
   for (const Eigen::Vector3f& point : points) {
-    if ((point - centre).squaredNorm() <= radius * radius) around.push_back(point);
+    if ((point - centre).squaredNorm() > radius * radius) continue;
+    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm))) continue;
+    around.push_back(point);
+    if (around.size() == most) break;
   }
   return around;
 }
 
 std::vector<Eigen::Vector3f> level_points(const scan::Scan& scan, double spacing_mm, const Context& context) {
-  if (spacing_mm <= scan.spacing_mm) return scan.cloud.positions;
+  if (spacing_mm <= scan.spacing_mm) return shuffled(scan.cloud.positions);
   std::vector<Eigen::Vector3f> points;
   for (const std::uint32_t i : even_subset(scan.cloud.positions, spacing_mm, context)) {
     points.push_back(scan.cloud.positions[i]);
   }
-  return points;
+  return shuffled(std::move(points));
 }
 
 void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double contradiction_weight) {
@@ -105,7 +123,8 @@ class Verification {
         options_(options),
         context_(context),
         evidence_(scan, background(scan, model, options, context)),
-        final_distance_(score_distance(scan, model, options)) {}
+        final_distance_(score_distance(scan, model, options)),
+        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)) {}
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
   [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates) const {
@@ -121,15 +140,9 @@ class Verification {
 
   // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
   void register_densely(Candidate& candidate) const {
-    constexpr std::size_t kMostPoints = 30000;
-    std::vector<Eigen::Vector3f> around =
-        points_around(evidence_.foreground.cloud.positions, candidate.model_from_scan, model_, 0.05 * model_.diameter);
-    if (around.size() > kMostPoints) {
-      const std::size_t step = around.size() / kMostPoints + 1;
-      std::vector<Eigen::Vector3f> thinned;
-      for (std::size_t i = 0; i < around.size(); i += step) thinned.push_back(around[i]);
-      around = std::move(thinned);
-    }
+    constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
+    const std::vector<Eigen::Vector3f> around =
+        points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
     for (const double scale : {1.5 * final_distance_, final_distance_}) {
       const LmIcpResult result =
           lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 30, !options_.paper_mode});
@@ -137,7 +150,7 @@ class Verification {
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
     }
-    judge(candidate, model_.dense_samples, final_distance_, kContradictionWeight);
+    judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     candidate.normal_agreement =
         normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
                          options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
@@ -153,20 +166,22 @@ class Verification {
  private:
   void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {
     const std::vector<Eigen::Vector3f> around =
-        points_around(points, candidate.model_from_scan, model_, 2.0 * level.robust_scale_mm[0]);
+        points_around(points, candidate.model_from_scan, model_, 2.0 * level.robust_scale_mm[0], level.most_points);
     for (const double scale : level.robust_scale_mm) {
       candidate.model_from_scan =
           lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, !options_.paper_mode})
               .model_from_scan;
     }
-    judge(candidate, *level.model_samples, level.score_distance_mm, level.contradiction_weight);
+    judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
   }
 
-  void judge(Candidate& candidate, const PointCloud& samples, double distance_mm, double contradiction_weight) const {
+  void judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
+             double contradiction_weight) const {
     // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
     const double lateral = options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
     take_evidence(candidate,
-                  evidence_for(candidate.model_from_scan, samples, model_, evidence_, {distance_mm, lateral}),
+                  evidence_for(candidate.model_from_scan, samples, model_, evidence_,
+                               {distance_mm, lateral, most_samples}),
                   contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
   }
@@ -177,6 +192,7 @@ class Verification {
   const Context& context_;
   ScanEvidence evidence_;
   double final_distance_;
+  std::vector<Eigen::Vector3f> shuffled_foreground_;
 };
 
 }  // namespace
