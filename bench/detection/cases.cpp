@@ -79,12 +79,17 @@ TriangleMesh relative_of(const Case& the_case, std::span<const SuitePart> parts)
 TriangleMesh decoy_of(const Case& the_case, std::span<const SuitePart> parts) {
   const TriangleMesh& mesh = parts[the_case.part].mesh;
   switch (the_case.content) {
-    case Content::smaller: return simulate::scaled(mesh, Eigen::Vector3d::Constant(kSmaller));
-    case Content::larger: return simulate::scaled(mesh, Eigen::Vector3d::Constant(kLarger));
-    case Content::mirrored: return simulate::scaled(mesh, {-1.0, 1.0, 1.0});
-    case Content::family: return relative_of(the_case, parts);
+    case Content::smaller:
+      return simulate::scaled(mesh, Eigen::Vector3d::Constant(kSmaller));
+    case Content::larger:
+      return simulate::scaled(mesh, Eigen::Vector3d::Constant(kLarger));
+    case Content::mirrored:
+      return simulate::scaled(mesh, {-1.0, 1.0, 1.0});
+    case Content::family:
+      return relative_of(the_case, parts);
     case Content::part:
-    case Content::clutter: break;
+    case Content::clutter:
+      break;
   }
   return {};
 }
@@ -107,8 +112,7 @@ Case case_of(std::uint64_t seed, std::span<const SuitePart> parts, double point_
   const std::uint64_t cycle = seed / kCycle, slot = seed % kCycle;
   const bool present = slot < kPresentOf;
   // Number of the case among those of its kind; the part goes round with it, the rest with each round of the parts.
-  const std::uint64_t number =
-      present ? cycle * kPresentOf + slot : cycle * (kCycle - kPresentOf) + slot - kPresentOf;
+  const std::uint64_t number = present ? cycle * kPresentOf + slot : cycle * (kCycle - kPresentOf) + slot - kPresentOf;
   const std::uint64_t part = number % parts.size(), turn = part + number / parts.size();
 
   Case result;
@@ -136,8 +140,9 @@ Result<CaseScan> scan_of(const Case& the_case, std::span<const SuitePart> parts,
     options.seed = Random(the_case.seed, "simulate", attempt).bits() >> 1;
     ASBUILT_TRY(simulation, simulate::simulate(mesh, options, context, decoys));
     simulate::SimulatedScan& scan = simulation.scans.front();
-    result = {{}, scan.model_from_scan, scan.hidden, scan.occlusion, scan.clutter,
-              simulation.deviation_max_mm / diameter(mesh)};
+    result = {{},           scan.model_from_scan,
+              scan.hidden,  scan.occlusion,
+              scan.clutter, simulation.deviation_max_mm / diameter(mesh)};
     result.points_in_scan.positions = std::move(scan.points_in_scan);
     if (the_case.content != Content::part || stratum_of(scan.hidden) == the_case.stratum) break;
   }

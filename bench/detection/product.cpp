@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "product.h"
 
-#include <algorithm>
-#include <chrono>
-#include <ctime>
 #include <span>
 #include <utility>
 
 #include "asbuilt/detect/detect.h"
-#include "asbuilt/evaluate/evaluate.h"
-#include "asbuilt/evaluate/pose_error.h"
 #include "asbuilt/pipeline/scan_hints.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/scan/scan.h"
@@ -17,43 +12,6 @@
 
 namespace asbuilt::bench {
 namespace {
-
-// How near a hypothesis must be for the registration to have a fair chance.
-constexpr double kNearAngleDeg = 12.0, kNearShare = 0.1;
-
-double processor_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Adds the time until it is destroyed.
-class Timed {
- public:
-  explicit Timed(StepTime& time) : time_(time) {}
-  ~Timed() {
-    time_.cpu += processor_seconds() - cpu_begin_;
-    time_.wall += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-
- private:
-  StepTime& time_;
-  double cpu_begin_ = processor_seconds();
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
-
-std::optional<std::size_t> first_near(std::span<const detect::Hypothesis> hypotheses, const Pose& truth,
-                                      const SuitePart& part) {
-  const double reach = kNearShare * diameter(part.mesh);
-  const auto near = std::ranges::find_if(hypotheses, [&](const detect::Hypothesis& hypothesis) {
-    const auto error = evaluate::pose_error(hypothesis.model_from_scan, truth, part.mesh, part.symmetries);
-    return error.angle_deg <= kNearAngleDeg && error.translation_mm <= reach;
-  });
-  if (near == hypotheses.end()) return std::nullopt;
-  return static_cast<std::size_t>(near - hypotheses.begin());
-}
 
 void note(CaseRecord& record, const verify::Detection& detection) {
   const bool accepted = detection.status == verify::Status::accepted;
@@ -85,36 +43,6 @@ Result<PreparedPart> prepared(const SuitePart& part, const pipeline::Options& op
   ASBUILT_TRY(model, model::prepare(part.mesh, options.model, context));
   ASBUILT_TRY(codebook, detect::build_codebook(model, options.detect, context));
   return PreparedPart{std::move(model), std::move(codebook)};
-}
-
-Judged judged(const Pose& model_from_scan, const std::optional<Pose>& true_model_from_scan, const SuitePart& part) {
-  Judged result;
-  result.has_pose = true;
-  if (!true_model_from_scan) return result;
-  const auto error = evaluate::pose_error(model_from_scan, *true_model_from_scan, part.mesh, part.symmetries);
-  result.displacement = error.max_vertex_mm / diameter(part.mesh);
-  result.right = *result.displacement <= evaluate::EvaluateOptions{}.right_ratio;
-  return result;
-}
-
-CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan& scan) {
-  CaseRecord record;
-  record.seed = the_case.seed;
-  record.group = name_of(part.group);
-  record.part = part.name;
-  record.content = name_of(the_case.content);
-  record.sensor = the_case.options.sensor;
-  record.hidden = scan.hidden;
-  record.occlusion = scan.occlusion;
-  record.clutter = scan.clutter;
-  record.noise_ratio = the_case.options.noise_ratio;
-  record.deviation_ratio = scan.deviation_ratio;
-  record.diameter_mm = diameter(part.mesh);
-  record.points = scan.points_in_scan.size();
-  if (!record.present()) return record;
-  const std::size_t stratum = stratum_of(scan.hidden);
-  record.stratum = stratum < kStrataCount ? kStrata[stratum].name : "outside";
-  return record;
 }
 
 Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const SuitePart& part,
@@ -149,7 +77,9 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
 
   record.hypotheses = hypotheses.size();
   if (hypotheses.empty()) return {};
-  if (scan_of_case.model_from_scan) record.right_rank = first_near(hypotheses, *scan_of_case.model_from_scan, part);
+  std::vector<Pose> poses;
+  for (const detect::Hypothesis& hypothesis : hypotheses) poses.push_back(hypothesis.model_from_scan);
+  record.right_rank = first_near(poses, scan_of_case.model_from_scan, part);
   // What one would have without a judge: the strongest cluster, registered.
   const std::span<const detect::Hypothesis> strongest(hypotheses.data(), 1);
   ASBUILT_TRY(registered, verify::verify(*scan, prepared.model, strongest, options.verify, context, true));

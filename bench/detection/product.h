@@ -21,13 +21,6 @@ struct PreparedPart {
 [[nodiscard]] Result<PreparedPart> prepared(const SuitePart& part, const pipeline::Options& options,
                                             const Context& context);
 
-/// Whether a pose is right: no vertex displaced by more than 2 % of the diameter, modulo the part's symmetry.
-[[nodiscard]] Judged judged(const Pose& model_from_scan, const std::optional<Pose>& true_model_from_scan,
-                            const SuitePart& part);
-
-/// What the case is, before anything looks at its scan.
-[[nodiscard]] CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan& scan);
-
 /// Takes the scan the way the pipeline takes it (scan preparation, size check, detection, verification) and notes what
 /// came of it and how long each step took. An error of a stage is a status, "failed".
 /// `options` have paper mode applied.

@@ -4,17 +4,30 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <tuple>
 
+#include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/evaluate/evaluate.h"
+#include "asbuilt/evaluate/pose_error.h"
 #include "asbuilt/io/file.h"
 
 namespace asbuilt::bench {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// How near a hypothesis must be for the registration to have a fair chance.
+constexpr double kNearAngleDeg = 12.0, kNearShare = 0.1;
+
+double processor_seconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 // Every field once, for both directions.
 template <class Record, class Visitor>
@@ -49,6 +62,7 @@ void for_each_field(Record& record, Visitor&& field) {
   field("explained_samples", record.explained_samples);
   field("hypotheses", record.hypotheses);
   field("right_rank", record.right_rank);
+  field("prepare_model", record.prepare_model);
   field("prepare_scan", record.prepare_scan);
   field("detect", record.detect);
   field("verify", record.verify);
@@ -90,6 +104,54 @@ void take(const Json& json, Judged& judged) {
 }
 
 }  // namespace
+
+Timed::Timed(StepTime& time) : time_(time), cpu_begin_(processor_seconds()), begin_(std::chrono::steady_clock::now()) {}
+Timed::~Timed() {
+  time_.cpu += processor_seconds() - cpu_begin_;
+  time_.wall += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+}
+
+Judged judged(const Pose& model_from_scan, const std::optional<Pose>& true_model_from_scan, const SuitePart& part) {
+  Judged result;
+  result.has_pose = true;
+  if (!true_model_from_scan) return result;
+  const auto error = evaluate::pose_error(model_from_scan, *true_model_from_scan, part.mesh, part.symmetries);
+  result.displacement = error.max_vertex_mm / diameter(part.mesh);
+  result.right = *result.displacement <= evaluate::EvaluateOptions{}.right_ratio;
+  return result;
+}
+
+std::optional<std::size_t> first_near(std::span<const Pose> model_from_scan,
+                                      const std::optional<Pose>& true_model_from_scan, const SuitePart& part) {
+  if (!true_model_from_scan) return std::nullopt;
+  const double reach = kNearShare * diameter(part.mesh);
+  const auto near = std::ranges::find_if(model_from_scan, [&](const Pose& pose) {
+    const auto error = evaluate::pose_error(pose, *true_model_from_scan, part.mesh, part.symmetries);
+    return error.angle_deg <= kNearAngleDeg && error.translation_mm <= reach;
+  });
+  if (near == model_from_scan.end()) return std::nullopt;
+  return static_cast<std::size_t>(near - model_from_scan.begin());
+}
+
+CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan& scan) {
+  CaseRecord record;
+  record.seed = the_case.seed;
+  record.group = name_of(part.group);
+  record.part = part.name;
+  record.content = name_of(the_case.content);
+  record.sensor = the_case.options.sensor;
+  record.hidden = scan.hidden;
+  record.occlusion = scan.occlusion;
+  record.clutter = scan.clutter;
+  record.noise_ratio = the_case.options.noise_ratio;
+  record.deviation_ratio = scan.deviation_ratio;
+  record.diameter_mm = diameter(part.mesh);
+  record.points = scan.points_in_scan.size();
+  if (!record.present()) return record;
+  const std::size_t stratum = stratum_of(scan.hidden);
+  record.stratum = stratum < kStrataCount ? kStrata[stratum].name : "outside";
+  return record;
+}
 
 std::string to_line(const CaseRecord& record) {
   Json json = Json::object();

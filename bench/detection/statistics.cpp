@@ -11,8 +11,7 @@ Interval wilson_interval(std::size_t hits, std::size_t trials, double quantile) 
   const auto n = static_cast<double>(trials);
   const double share = static_cast<double>(hits) / n, squared = quantile * quantile;
   const double centre = (share + squared / (2.0 * n)) / (1.0 + squared / n);
-  const double half =
-      quantile / (1.0 + squared / n) * std::sqrt(share * (1.0 - share) / n + squared / (4.0 * n * n));
+  const double half = quantile / (1.0 + squared / n) * std::sqrt(share * (1.0 - share) / n + squared / (4.0 * n * n));
   // At none and at all the bound is exact; the formula gives it only up to rounding.
   return {hits == 0 ? 0.0 : std::max(0.0, centre - half), hits == trials ? 1.0 : std::min(1.0, centre + half)};
 }

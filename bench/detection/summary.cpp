@@ -51,14 +51,13 @@ Json times(const Records& records) {
   };
   return {told("prepare scan", [](const CaseRecord& r) { return r.prepare_scan.wall; }),
           told("detect", [](const CaseRecord& r) { return r.detect.wall; }),
-          told("verify", [](const CaseRecord& r) { return r.verify.wall; }),
-          told("all", &CaseRecord::seconds),
+          told("verify", [](const CaseRecord& r) { return r.verify.wall; }), told("all", &CaseRecord::seconds),
           told("all, processor", &CaseRecord::cpu_seconds)};
 }
 
 Json named(const CaseRecord& record) {
-  Json json{{"seed", record.seed},     {"part", record.part},     {"content", record.content},
-            {"hidden", record.hidden}, {"sensor", record.sensor}, {"status", record.status},
+  Json json{{"seed", record.seed},         {"part", record.part},     {"content", record.content},
+            {"hidden", record.hidden},     {"sensor", record.sensor}, {"status", record.status},
             {"reason", record.reason_code}};
   json["best_is_right"] = record.best.right;
   json["displacement"] = record.best.displacement ? Json(*record.best.displacement) : Json(nullptr);
@@ -80,7 +79,8 @@ Json figures(const Records& records) {
   if (!outside.empty()) json["recall_by_hidden"]["outside"] = recall(outside);
   // How far detection alone gets: some hypothesis near the truth reaches verification.
   const Records present = filtered(records, &CaseRecord::present);
-  json["proposed"] = share(count(present, [](const CaseRecord& r) { return r.right_rank.has_value(); }), present.size());
+  json["proposed"] =
+      share(count(present, [](const CaseRecord& r) { return r.right_rank.has_value(); }), present.size());
 
   std::set<std::string> parts, sensors, decoys;
   for (const CaseRecord& record : records) {
@@ -89,7 +89,8 @@ Json figures(const Records& records) {
     if (!record.present()) decoys.insert(record.content);
   }
   for (const std::string& sensor : sensors) {
-    json["recall_by_sensor"][sensor] = recall(filtered(records, [&](const CaseRecord& r) { return r.sensor == sensor; }));
+    json["recall_by_sensor"][sensor] =
+        recall(filtered(records, [&](const CaseRecord& r) { return r.sensor == sensor; }));
   }
   for (const std::string& part : parts) {
     const Records own = filtered(records, [&](const CaseRecord& r) { return r.part == part; });
@@ -118,7 +119,9 @@ std::string percent(const Json& share) {
                      100.0 * share.at("low").get<double>(), 100.0 * share.at("high").get<double>());
 }
 
-std::string row(const std::string& name, const Json& share) { return fmt::format("| {} | {} |\n", name, percent(share)); }
+std::string row(const std::string& name, const Json& share) {
+  return fmt::format("| {} | {} |\n", name, percent(share));
+}
 
 std::string line_of(const Json& json) {
   const auto number = [](const Json& value, int digits) {
