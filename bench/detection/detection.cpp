@@ -12,6 +12,7 @@
 
 #include "asbuilt/io/file.h"
 #include "cases.h"
+#include "curves.h"
 #include "parts.h"
 #include "product.h"
 #include "record.h"
@@ -105,8 +106,16 @@ Result<void> describe_parts(const Arguments& arguments) {
 
 Result<void> summarise(const std::filesystem::path& output) {
   ASBUILT_TRY(records, read_records(output / "cases.jsonl"));
-  const nlohmann::ordered_json summary = summary_of(records);
+  nlohmann::ordered_json summary = summary_of(records);
   const std::string text = tables(summary);
+  // The curves are those of the distinct parts: a symmetric one is right or wrong by other rules.
+  std::erase_if(records, [](const CaseRecord& record) { return record.group != name_of(Group::distinct); });
+  for (const Diagram& diagram : diagrams_of(records)) {
+    ASBUILT_CHECK(io::write_file(output / (diagram.file + ".svg"), to_svg(diagram)));
+    for (const Series& series : diagram.series) {
+      summary["curves"][diagram.file][series.name] = {{"x", series.x}, {"y", series.y}};
+    }
+  }
   ASBUILT_CHECK(io::write_file(output / "summary.json", summary.dump(1) + "\n"));
   ASBUILT_CHECK(io::write_file(output / "summary.md", text));
   fmt::print("{}", text);

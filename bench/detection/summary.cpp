@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <vector>
@@ -55,6 +56,15 @@ Json times(const Records& records) {
           told("all, processor", &CaseRecord::cpu_seconds)};
 }
 
+// Once a part, however many of its scans there are.
+Json prepare_model(const Records& records) {
+  std::map<std::string, double> seconds;
+  for (const CaseRecord& record : records) seconds[record.part] = record.prepare_model.wall;
+  std::vector<double> values;
+  for (const auto& [part, value] : seconds) values.push_back(value);
+  return {{"median", percentile(values, 0.5)}, {"worst", percentile(values, 1.0)}};
+}
+
 Json named(const CaseRecord& record) {
   Json json{{"seed", record.seed},         {"part", record.part},     {"content", record.content},
             {"hidden", record.hidden},     {"sensor", record.sensor}, {"status", record.status},
@@ -103,6 +113,7 @@ Json figures(const Records& records) {
     json["without_the_part"][decoy] = share(count(own, &CaseRecord::accepted), own.size());
   }
   json["seconds"] = times(records);
+  json["prepare_model"] = prepare_model(records);
   json["wrong"] = Json::array();
   json["missed"] = Json::array();
   for (const CaseRecord& record : records) {
@@ -165,7 +176,48 @@ std::string section(const std::string& title, const Json& json) {
     text += fmt::format("| {} | {:.2f} | {:.2f} |\n", time.at("step").get<std::string>(),
                         time.at("median").get<double>(), time.at("p95").get<double>());
   }
+  const Json& preparation = json.at("prepare_model");
+  text += fmt::format("| preparing a model (worst in place of p95) | {:.2f} | {:.2f} |\n",
+                      preparation.at("median").get<double>(), preparation.at("worst").get<double>());
   return text + list_of("wrong: seed", json.at("wrong")) + list_of("missed: seed", json.at("missed"));
+}
+
+// The modes on the scans that all of them have taken.
+Json comparison(const Records& records) {
+  std::set<std::string> modes;
+  std::map<std::uint64_t, std::size_t> taken;
+  for (const CaseRecord& record : records) {
+    modes.insert(record.mode);
+    ++taken[record.seed];
+  }
+  Json json = Json::object();
+  if (modes.size() < 2) return json;
+  for (const std::string& mode : modes) {
+    const Records own =
+        filtered(records, [&](const CaseRecord& r) { return r.mode == mode && taken.at(r.seed) == modes.size(); });
+    if (own.empty()) return Json::object();
+    Json entry = figures(own);
+    entry.erase("wrong");
+    entry.erase("missed");
+    json[mode] = std::move(entry);
+  }
+  return json;
+}
+
+std::string comparison_table(const std::string& group, const Json& modes) {
+  std::string text = fmt::format(
+      "\n### The same scans, {} parts\n\n| mode | scans | recall | precision | median s | p95 s | preparing a model, "
+      "median s | worst s |\n|---|---|---|---|---|---|---|---|\n",
+      group);
+  for (const auto& [mode, entry] : modes.items()) {
+    const Json& all = entry.at("seconds").at(3);
+    text += fmt::format("| {} | {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", mode,
+                        entry.at("scans").get<std::size_t>(), percent(entry.at("recall")),
+                        percent(entry.at("precision")), all.at("median").get<double>(), all.at("p95").get<double>(),
+                        entry.at("prepare_model").at("median").get<double>(),
+                        entry.at("prepare_model").at("worst").get<double>());
+  }
+  return text;
 }
 
 }  // namespace
@@ -173,20 +225,24 @@ std::string section(const std::string& title, const Json& json) {
 Json summary_of(std::span<const CaseRecord> records) {
   std::set<std::pair<std::string, std::string>> sections;
   for (const CaseRecord& record : records) sections.emplace(record.mode, record.group);
-  Json json = Json::object();
+  Json json{{"modes", Json::object()}, {"same_scans", Json::object()}};
   for (const auto& [mode, group] : sections) {
-    json[mode][group] =
+    json["modes"][mode][group] =
         figures(filtered(records, [&](const CaseRecord& r) { return r.mode == mode && r.group == group; }));
+    json["same_scans"][group] = comparison(filtered(records, [&](const CaseRecord& r) { return r.group == group; }));
   }
   return json;
 }
 
 std::string tables(const Json& summary) {
   std::string text;
-  for (const auto& [mode, groups] : summary.items()) {
+  for (const auto& [mode, groups] : summary.at("modes").items()) {
     for (const auto& [group, figures] : groups.items()) {
       text += section(fmt::format("{}, {} parts", mode, group), figures);
     }
+  }
+  for (const auto& [group, modes] : summary.at("same_scans").items()) {
+    if (!modes.empty()) text += comparison_table(group, modes);
   }
   return text;
 }
