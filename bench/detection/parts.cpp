@@ -13,26 +13,30 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// A file of the CAD folder. The unit is chosen so that the part is some decimetres large where the file only says
-/// "size 1" (or is a model of a model).
+constexpr int kContinuous = 720;
+
+/// A file of the CAD folder. What is said of its symmetry was measured (`asbuilt_detection parts`). The unit makes the
+/// part some decimetres large where the file only says "size 1", or is a model of a model.
 struct CadFile {
   const char* file;
   Group group;
   const char* family;
   bool is_own_mirror;
   io::Unit unit;
+  int fold = 1;  ///< turns about an axis through the middle of the box that map the part onto itself
+  int axis = 2;
 };
 constexpr std::array kCadFiles{
     CadFile{"housing_TR12J.stl", Group::distinct, "casting", false, io::Unit::millimetre},
-    CadFile{"flange_bearing.stl", Group::distinct, "flange", true, io::Unit::millimetre},
+    CadFile{"flange_bearing.stl", Group::distinct, "flange", false, io::Unit::millimetre},
     CadFile{"motor_assembly.stl", Group::distinct, "casting", false, io::Unit::millimetre},
     CadFile{"anchor_bracket.off", Group::distinct, "bracket", true, io::Unit::metre},
     CadFile{"linkrod.stl", Group::distinct, "rod", true, io::Unit::inch},
     CadFile{"frame.stl", Group::distinct, "rod", true, io::Unit::millimetre},
     CadFile{"hinge.stl", Group::distinct, "bracket", true, io::Unit::millimetre},
     CadFile{"pipe_clamp_half.stl", Group::distinct, "bracket", true, io::Unit::millimetre},
-    CadFile{"screw_sym.stl", Group::distinct, "rod", true, io::Unit::millimetre},
-    CadFile{"turbine_rotor_sym.off", Group::symmetric, "flange", false, io::Unit::metre},
+    CadFile{"screw_sym.stl", Group::symmetric, "rod", true, io::Unit::millimetre, 2},
+    CadFile{"turbine_rotor_sym.off", Group::symmetric, "flange", true, io::Unit::metre, kContinuous, 0},
 };
 
 Pose turned(const Eigen::Vector3d& axis, double angle, const Eigen::Vector3d& centre) {
@@ -54,8 +58,6 @@ std::vector<Pose> with_flip(std::vector<Pose> about_z) {
   for (const Pose& turn : about_z) all.push_back(turn * flip);
   return all;
 }
-
-constexpr int kContinuous = 720;
 
 }  // namespace
 
@@ -91,6 +93,8 @@ Result<std::vector<SuitePart>> parts_of(const std::filesystem::path& cad_folder)
     if (!std::filesystem::exists(path)) continue;
     ASBUILT_TRY(mesh, io::read_mesh(path, cad.unit));
     parts.push_back({path.stem().string(), cad.group, cad.family, cad.is_own_mirror, std::move(mesh), {}});
+    parts.back().symmetries =
+        turns(Eigen::Vector3d::Unit(cad.axis), cad.fold, bounding_box(parts.back().mesh).center());
   }
   return parts;
 }
