@@ -256,11 +256,21 @@ TriangleMesh decoy_of(const TriangleMesh& part, const SimulateOptions& options) 
 }
 
 Scene arranged_once(const TriangleMesh& part, const SimulateOptions& options, const NoiseModel& noise,
-                    std::uint64_t index, bool has_part, Random random, const Context& context) {
+                    std::uint64_t index, bool has_part, Random random, const Context& context,
+                    std::span<const TriangleMesh> companions) {
   Arrangement arrangement(part, options, index, has_part, random);
   const double size = arrangement.size();
   const double reach = (options.sensor_kind() == SensorKind::laser_scanner ? 3.0 : 1.2) * size;
   const double wanted_hidden = random.uniform(options.hidden_low, options.hidden_high);
+  if (!has_part && !companions.empty()) {
+    const TriangleMesh& stand_in = companions.front();
+    const Eigen::Matrix3d rotation = part_rotation(stand_in, options, index, random);
+    arrangement.add(transformed(stand_in, standing(stand_in, rotation, 0.0, 0.0)), options.hidden_high, random);
+    companions = companions.subspan(1);
+  }
+  for (const TriangleMesh& companion : companions) {
+    add_thing(arrangement, companion, options.hidden_high, reach, random);
+  }
   const TriangleMesh decoy = options.decoys > 0 ? decoy_of(part, options) : TriangleMesh{};
   for (int i = 0; i < options.decoys; ++i) add_thing(arrangement, decoy, options.hidden_high, reach, random);
   const auto things = static_cast<int>(std::lround(options.clutter_objects * random.uniform(0.6, 1.4)));
@@ -290,11 +300,11 @@ double middle_distance_mm(SensorKind kind, double diameter_mm) {
 }
 
 Scene arrange(const TriangleMesh& part_in_model, const SimulateOptions& options, const NoiseModel& noise,
-              std::uint64_t index, bool has_part, const Context& context) {
+              std::uint64_t index, bool has_part, const Context& context, std::span<const TriangleMesh> companions) {
   std::optional<Scene> best;
   for (std::uint64_t placing = 0; placing < kPlacings && !context.cancelled(); ++placing) {
     Scene scene = arranged_once(part_in_model, options, noise, index, has_part,
-                                Random(options.seed, "scene", index * kPlacings + placing), context);
+                                Random(options.seed, "scene", index * kPlacings + placing), context, companions);
     if (!best || miss(scene, options) < miss(*best, options)) best = std::move(scene);
     if (!has_part || miss(*best, options) == 0.0) break;
   }

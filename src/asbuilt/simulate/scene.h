@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "asbuilt/core/context.h"
@@ -30,8 +31,10 @@ struct Scene {
 
 /// Arranges scan number `index`: part, sensor, things standing, lying and leaning around, things in the way. Placings
 /// are drawn until clutter and hidden share lie in their ranges; of 8 without success the one that comes closest.
-/// `part_in_model` is the as-built mesh; `has_part` false leaves it out. Nothing intersects the part.
+/// `part_in_model` is the as-built mesh; `has_part` false leaves it out. Nothing intersects the part. `companions` are
+/// things that stand around in addition to the random ones; without the part, the first takes its place.
 [[nodiscard]] Scene arrange(const TriangleMesh& part_in_model, const SimulateOptions& options, const NoiseModel& noise,
-                            std::uint64_t index, bool has_part, const Context& context);
+                            std::uint64_t index, bool has_part, const Context& context,
+                            std::span<const TriangleMesh> companions = {});
 
 }  // namespace asbuilt::simulate

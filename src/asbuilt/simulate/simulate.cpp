@@ -64,7 +64,8 @@ NoiseModel noise_model(const SimulateOptions& options, double diameter_mm) {
   return noise;
 }
 
-Result<Simulation> simulate(const TriangleMesh& cad, const SimulateOptions& options, const Context& context) {
+Result<Simulation> simulate(const TriangleMesh& cad, const SimulateOptions& options, const Context& context,
+                            std::span<const TriangleMesh> companions) {
   ASBUILT_CHECK(options.validate());
   ASBUILT_TRY(built, as_built(cad, options.as_built, options.seed));
   const NoiseModel noise = noise_model(options, diameter(cad));
@@ -72,7 +73,7 @@ Result<Simulation> simulate(const TriangleMesh& cad, const SimulateOptions& opti
   Simulation result{cad, std::move(built.mesh), noise.sigma_mm, built.deviation_rms_mm, built.deviation_max_mm, {}};
   const std::vector<bool> present = presence(options);
   for (std::size_t i = 0; i < present.size(); ++i) {
-    const Scene scene = arrange(result.as_built, options, noise, i, present[i], context);
+    const Scene scene = arrange(result.as_built, options, noise, i, present[i], context, companions);
     if (context.cancelled()) return fail(ErrorCode::cancelled, "the simulation was cancelled");
     result.scans.push_back(scan_of(scene, options, noise, i, context));
     if (context.cancelled()) return fail(ErrorCode::cancelled, "the simulation was cancelled");

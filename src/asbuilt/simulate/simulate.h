@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -44,10 +45,12 @@ struct Simulation {
 [[nodiscard]] NoiseModel noise_model(const SimulateOptions& options, double diameter_mm);
 
 /// Simulates scans of a part in scenes that are new for each scan. The same for a seed, whatever the thread count.
+/// `companions` are meshes that stand in every scan in addition to the random things, as far as there is room (a part of
+/// the same family, say); in a scan without the part, the first of them takes its place.
 /// Source: Sec. 4 (data), occlusion and clutter as defined there. Cost: about a second for a scan of 100 000 points.
 /// Errors: invalid_argument from validate(); not_possible for a model without area; cancelled.
 [[nodiscard]] Result<Simulation> simulate(const TriangleMesh& cad, const SimulateOptions& options,
-                                          const Context& context);
+                                          const Context& context, std::span<const TriangleMesh> companions = {});
 
 /// Writes scan_NN.ply and scan_NN.labels, model.ply, as_built.ply and at last truth.json into a folder, which is made
 /// if need be; each file whole or not at all. Errors: unwritable_output.

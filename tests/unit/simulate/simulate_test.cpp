@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -54,6 +55,36 @@ TEST(Simulate, TruePosesPutThePartsPointsOntoTheAsBuiltSurface) {
       EXPECT_LT(worst, 5.5);
     }
   }
+}
+
+TEST(Simulate, ACompanionTakesThePlaceOfAnAbsentPart) {
+  SimulateOptions options = quick();
+  options.absent_share = 1.0;
+  options.clutter_objects = 0;
+  options.floor = false;
+  const std::vector<TriangleMesh> companions{test::stepped_block()};
+  const Simulation without = simulate(test::casing(), options, Context(2)).value();
+  const Simulation with = simulate(test::casing(), options, Context(2), companions).value();
+  for (const SimulatedScan& scan : without.scans) EXPECT_TRUE(scan.points_in_scan.empty());
+  for (const SimulatedScan& scan : with.scans) {
+    EXPECT_FALSE(scan.model_from_scan);
+    EXPECT_GT(std::ranges::count(scan.labels, Label::kFirstThing), 100);
+    EXPECT_EQ(std::ranges::count(scan.labels, Label::kPart), 0);
+  }
+}
+
+TEST(Simulate, CompanionsStandBesideThePart) {
+  SimulateOptions options = quick();
+  options.clutter_objects = 0;
+  const std::vector<TriangleMesh> companions{test::stepped_block()};
+  const Simulation simulation = simulate(test::casing(), options, Context(2), companions).value();
+  std::ptrdiff_t companion = 0;
+  for (const SimulatedScan& scan : simulation.scans) {
+    EXPECT_TRUE(scan.model_from_scan);
+    EXPECT_GT(std::ranges::count(scan.labels, Label::kPart), 100);
+    companion += std::ranges::count(scan.labels, Label::kFirstThing);
+  }
+  EXPECT_GT(companion, 0);
 }
 
 TEST(Simulate, OtherPointsAreNotOnThePart) {

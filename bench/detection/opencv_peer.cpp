@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// asbuilt_detection_opencv: the same scans through OpenCV's surface_matching (opencv_contrib, PPF3DDetector and ICP),
+// set up as its own sample does, but for what the sample leaves to the user: even model samples and good normals on
+// both sides (ours, which its sampling averages), and a scene sampled as densely as the model, in mm.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/surface_matching.hpp>
+#include <opencv2/surface_matching/ppf_helpers.hpp>
+
+#include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/model/sample_normals.h"
+#include "asbuilt/scan/scan.h"
+#include "record.h"
+#include "selection.h"
+
+namespace asbuilt::bench {
+namespace {
+
+namespace ppf = cv::ppf_match_3d;
+
+constexpr double kRelativeDistanceStep = 0.05;       // of the sample
+constexpr double kSceneReferenceShare = 1.0 / 40.0;  // of the sample
+constexpr std::size_t kRegistered = 5;               // poses that go through the ICP
+constexpr std::size_t kLooked = 50;                  // poses among which the right one is looked for
+constexpr double kIcpSpacing = 1.0 / 3.0;            // of the points for the ICP / sampling distance
+
+// Rows of x y z nx ny nz.
+cv::Mat to_mat(const PointCloud& cloud) {
+  cv::Mat mat(static_cast<int>(cloud.size()), 6, CV_32F);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    auto* row = mat.ptr<float>(static_cast<int>(i));
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      row[k] = cloud.positions[i][k];
+      row[3 + k] = cloud.normals[i][k];
+    }
+  }
+  return mat;
+}
+
+Pose model_from_scan_of(const ppf::Pose3D& found) {
+  Eigen::Matrix4d scan_from_model;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) scan_from_model(row, column) = found.pose(row, column);
+  }
+  Pose pose;
+  pose.matrix() = scan_from_model;
+  return orthonormalised(pose).inverse();
+}
+
+PointCloud subset(const PointCloud& cloud, double spacing_mm, const Context& context) {
+  PointCloud some;
+  for (const std::uint32_t i : even_subset(cloud.positions, spacing_mm, context)) {
+    some.positions.push_back(cloud.positions[i]);
+    some.normals.push_back(cloud.normals[i]);
+  }
+  return some;
+}
+
+double extent_mm(const PointCloud& cloud) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& point : cloud.positions) box.extend(point);
+  return box.diagonal().cast<double>().norm();
+}
+
+/// A trained detector, and the part's samples for its ICP.
+struct Trained {
+  ppf::PPF3DDetector detector;
+  cv::Mat samples;
+  double diameter_mm = 0.0, spacing_mm = 0.0;
+};
+
+Result<std::shared_ptr<Trained>> trained(const SuitePart& part, double sampling_ratio, const Context& context) {
+  model::ModelOptions options;
+  options.sampling_ratio = sampling_ratio;
+  ASBUILT_TRY(model, model::prepare(part.mesh, options, context));
+  PointCloud samples = model.dense_samples;
+  samples.normals = model::fitted_normals(model.dense_samples, model.dense_samples, model.sampling_distance, context);
+  auto result = std::make_shared<Trained>();
+  result->detector = ppf::PPF3DDetector(sampling_ratio, kRelativeDistanceStep);
+  result->samples = to_mat(samples);
+  result->diameter_mm = model.diameter;
+  result->spacing_mm = model.sampling_distance;
+  result->detector.trainModel(result->samples);
+  return result;
+}
+
+Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const SuitePart& part, Trained& trained,
+                   const Context& context) {
+  PointCloud cloud;
+  {
+    const Timed timed(record.prepare_scan);
+    ASBUILT_TRY(scan, scan::prepare_scan(scan_of_case.points_in_scan, std::nullopt, {}, {}, context));
+    cloud = std::move(scan.cloud);
+  }
+  std::vector<ppf::Pose3DPtr> results;
+  {
+    const Timed timed(record.detect);
+    // It samples relative to the scene, of whatever size that is.
+    const double scene_ratio = trained.spacing_mm / extent_mm(cloud);
+    trained.detector.match(to_mat(cloud), results, kSceneReferenceShare, scene_ratio);
+  }
+  record.status = "rejected";
+  record.reason_code = "no_hypothesis";
+  record.hypotheses = results.size();
+  if (results.empty()) return {};
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < std::min(results.size(), kLooked); ++i) poses.push_back(model_from_scan_of(*results[i]));
+  record.right_rank = first_near(poses, scan_of_case.model_from_scan, part);
+
+  std::vector<ppf::Pose3DPtr> registered(results.begin(),
+                                         results.begin() + static_cast<long>(std::min(results.size(), kRegistered)));
+  {
+    const Timed timed(record.verify);
+    const cv::Mat points = to_mat(subset(cloud, kIcpSpacing * trained.spacing_mm, context));
+    ppf::ICP icp(100, 0.005F, 2.5F, 8);
+    icp.registerModelToScene(trained.samples, points, registered);
+  }
+  // It cannot say that the part is not there: its first result always counts.
+  record.status = "accepted";
+  record.reason_code = "";
+  record.votes = static_cast<double>(results.front()->numVotes);
+  record.best = judged(model_from_scan_of(*registered.front()), scan_of_case.model_from_scan, part);
+  record.best.score = record.votes;
+  record.unverified = record.best;
+  return {};
+}
+
+int run(int argc, char** argv) {
+  Selection selection;
+  double sampling_ratio = 0.025;
+  CLI::App app("The scans of the detection suite through OpenCV's surface_matching");
+  add_options(app, selection);
+  app.add_option("--sampling", sampling_ratio, "relative sampling step of the model")->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+
+  const Context context(selection.threads);
+  const auto judge_for = [&](const SuitePart& part) -> Result<Judge> {
+    ASBUILT_TRY(detector, trained(part, sampling_ratio, context));
+    return [&, detector](CaseRecord& record, const CaseScan& scan) {
+      return judge(record, scan, part, *detector, context);
+    };
+  };
+  const auto done = run_cases(selection, fmt::format("opencv {:g}", sampling_ratio), judge_for, context);
+  if (done) return 0;
+  fmt::print(stderr, "asbuilt_detection_opencv: {}\n", done.error().message);
+  return 1;
+}
+
+}  // namespace
+}  // namespace asbuilt::bench
+
+int main(int argc, char** argv) {
+  try {
+    return asbuilt::bench::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "asbuilt_detection_opencv: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "product.h"
+
+#include <span>
+#include <utility>
+
+#include "asbuilt/detect/detect.h"
+#include "asbuilt/pipeline/scan_hints.h"
+#include "asbuilt/pipeline/unit_check.h"
+#include "asbuilt/scan/scan.h"
+#include "asbuilt/verify/verify.h"
+
+namespace asbuilt::bench {
+namespace {
+
+void note(CaseRecord& record, const verify::Detection& detection) {
+  const bool accepted = detection.status == verify::Status::accepted;
+  record.status = accepted ? "accepted" : detection.status == verify::Status::ambiguous ? "ambiguous" : "rejected";
+  record.reason_code = detection.reason == verify::Reason::none ? "" : verify::code_of(detection.reason);
+  record.reason = detection.explanation;
+  if (detection.candidates.empty()) return;
+  const verify::Candidate& best = detection.best;
+  record.votes = best.votes;
+  record.support = best.support;
+  record.visible_share = best.visible_share;
+  record.normal_agreement = best.normal_agreement;
+  record.contradiction_share = best.contradiction_share;
+  record.hidden_share = best.hidden_share;
+  record.residual_ratio = best.residual_ratio;
+  record.weakest_direction = best.weakest_direction;
+  record.explained_samples = best.explained_samples;
+}
+
+void note_failure(CaseRecord& record, const char* code, std::string reason) {
+  record.status = "failed";
+  record.reason_code = code;
+  record.reason = std::move(reason);
+}
+
+}  // namespace
+
+Result<PreparedPart> prepared(const SuitePart& part, const pipeline::Options& options, const Context& context) {
+  ASBUILT_TRY(model, model::prepare(part.mesh, options.model, context));
+  ASBUILT_TRY(codebook, detect::build_codebook(model, options.detect, context));
+  return PreparedPart{std::move(model), std::move(codebook)};
+}
+
+Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const SuitePart& part,
+                   const PreparedPart& prepared, const pipeline::Options& options, const Context& context) {
+  ASBUILT_TRY(viewpoints, pipeline::Viewpoints::from_text(options.viewpoint, options.scan_unit));
+  Result<scan::Scan> scan;
+  {
+    const Timed timed(record.prepare_scan);
+    scan = scan::prepare_scan(scan_of_case.points_in_scan, std::nullopt, viewpoints.of("", ""), options.scan, context);
+  }
+  if (!scan) return note_failure(record, "unreadable", scan.error().message), Result<void>{};
+  if (const auto contradiction = pipeline::size_contradiction(*scan, prepared.model, options)) {
+    return note_failure(record, verify::code_of(verify::Reason::scan_too_small), *contradiction), Result<void>{};
+  }
+  std::vector<detect::Hypothesis> hypotheses;
+  {
+    const Timed timed(record.detect);
+    ASBUILT_TRY(found, detect::find_hypotheses(*scan, *prepared.codebook, options.detect, context));
+    hypotheses = std::move(found);
+  }
+  Result<verify::Detection> detection;
+  {
+    const Timed timed(record.verify);
+    detection = verify::verify(*scan, prepared.model, hypotheses, options.verify, context);
+  }
+  if (!detection) return tl::unexpected(detection.error());
+  note(record, *detection);
+  if (!detection->candidates.empty()) {
+    record.best = judged(detection->best.model_from_scan, scan_of_case.model_from_scan, part);
+    record.best.score = detection->best.score;
+  }
+
+  record.hypotheses = hypotheses.size();
+  if (hypotheses.empty()) return {};
+  std::vector<Pose> poses;
+  for (const detect::Hypothesis& hypothesis : hypotheses) poses.push_back(hypothesis.model_from_scan);
+  record.right_rank = first_near(poses, scan_of_case.model_from_scan, part);
+  // What one would have without a judge: the strongest cluster, registered.
+  const std::span<const detect::Hypothesis> strongest(hypotheses.data(), 1);
+  ASBUILT_TRY(registered, verify::verify(*scan, prepared.model, strongest, options.verify, context, true));
+  record.unverified = judged(registered.best.model_from_scan, scan_of_case.model_from_scan, part);
+  record.unverified.score = strongest.front().votes;
+  return {};
+}
+
+}  // namespace asbuilt::bench
