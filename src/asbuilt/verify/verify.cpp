@@ -15,7 +15,9 @@
 #include "asbuilt/detect/large_planes.h"
 #include "asbuilt/verify/evidence.h"
 #include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
+#include "asbuilt/verify/slip.h"
 #include "asbuilt/verify/verdict.h"
 
 namespace asbuilt::verify {
@@ -24,6 +26,14 @@ namespace {
 // Log odds: a contradiction is rare at a right pose and common at a wrong one; agreement is common at both.
 constexpr double kContradictionWeight = 3.0;
 
+// Of the diameter. A pose that could be displaced so far unnoticed is not known.
+constexpr double kSlip = 0.03;
+constexpr std::size_t kMostSlipSamples = 1500;
+
+// Of the diameter: how far past its edges the part's surface must not go on.
+constexpr double kRimReach = 0.03;
+constexpr std::size_t kMostRimSamples = 3000;
+
 constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
 
 /// One level of the coarse-to-fine pyramid (Sec. 3.1: three of them).
@@ -31,7 +41,7 @@ struct Level {
   double spacing_mm;                      ///< of the scan points used
   std::array<double, 2> robust_scale_mm;  ///< of the two passes
   double score_distance_mm;
-  std::size_t most_points;  ///< scan points that a registration takes, spread over the part
+  std::size_t most_points;   ///< scan points that a registration takes, spread over the part
   std::size_t most_samples;  ///< model samples that are asked for evidence, likewise
   std::size_t survivors;     ///< candidates that reach the next level
   const PointCloud* model_samples;
@@ -54,17 +64,16 @@ std::vector<std::uint8_t> background(const scan::Scan& scan, const model::Prepar
 
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
   const double d = model.sampling_distance;
-  return {
-      {{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
-       {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
-       {0.3 * d,
-        {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-        final_distance,
-        3000,
-        3000,
-        8,
-        &model.dense_samples,
-        kContradictionWeight}}};
+  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
+           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
+           {0.3 * d,
+            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+            final_distance,
+            3000,
+            3000,
+            8,
+            &model.dense_samples,
+            kContradictionWeight}}};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -84,7 +93,8 @@ std::vector<Eigen::Vector3f> points_around(const std::vector<Eigen::Vector3f>& p
   std::vector<Eigen::Vector3f> around;
   for (const Eigen::Vector3f& point : points) {
     if ((point - centre).squaredNorm() > radius * radius) continue;
-    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm))) continue;
+    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm)))
+      continue;
     around.push_back(point);
     if (around.size() == most) break;
   }
@@ -110,8 +120,7 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double co
   const double denied = evidence.contradicted + evidence.seen_through;
   candidate.contradiction_share =
       evidence.facing > evidence.hidden ? denied / (evidence.facing - evidence.hidden) : 0.0;
-  candidate.support = (evidence.explained - contradiction_weight * denied - 0.25 * evidence.missing) /
-                      static_cast<double>(evidence.samples);
+  candidate.support = evidence.support(contradiction_weight);
 }
 
 class Verification {
@@ -124,7 +133,9 @@ class Verification {
         context_(context),
         evidence_(scan, background(scan, model, options, context)),
         final_distance_(score_distance(scan, model, options)),
-        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)) {}
+        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
+        rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
+        rim_probes_(rim_probes(model, rim_reach_, kMostRimSamples)) {}
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
   [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates) const {
@@ -151,6 +162,11 @@ class Verification {
       candidate.residual_ratio = result.rms_mm / final_distance_;
     }
     judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+    EvidenceOptions sparse{final_distance_, lateral(final_distance_), kMostSlipSamples};
+    candidate.slip_loss =
+        slip_loss(candidate.model_from_scan, model_, kSlip * model_.diameter, evidence_, kContradictionWeight, sparse);
+    candidate.overrun_share =
+        rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, sparse).overrun_share();
     candidate.normal_agreement =
         normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
                          options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
@@ -177,13 +193,16 @@ class Verification {
 
   void judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
              double contradiction_weight) const {
-    // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
-    const double lateral = options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
     take_evidence(candidate,
                   evidence_for(candidate.model_from_scan, samples, model_, evidence_,
-                               {distance_mm, lateral, most_samples}),
+                               {distance_mm, lateral(distance_mm), most_samples}),
                   contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
+  }
+
+  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
+  [[nodiscard]] double lateral(double distance_mm) const {
+    return options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
   }
 
   const scan::Scan& scan_;
@@ -193,6 +212,8 @@ class Verification {
   ScanEvidence evidence_;
   double final_distance_;
   std::vector<Eigen::Vector3f> shuffled_foreground_;
+  double rim_reach_;
+  std::vector<RimProbe> rim_probes_;
 };
 
 }  // namespace
