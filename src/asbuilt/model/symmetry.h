@@ -43,6 +43,7 @@ struct SymmetryGroup {
   std::vector<NearAxis> near_axes;                   ///< by decreasing share
 
   [[nodiscard]] bool is_trivial() const { return kind == Kind::none; }
+  [[nodiscard]] bool has_near() const { return !near.empty() || !near_axes.empty(); }
 
   /// The element that comes closest to a motion of the model: that moves the corners of `box` nearly as it does.
   [[nodiscard]] Pose closest_element(const Pose& motion, const Eigen::AlignedBox3d& box) const;
