@@ -11,6 +11,7 @@
 #include "asbuilt/evaluate/surface_error.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/ply_writer.h"
+#include "asbuilt/model/prepared_model.h"
 #include "asbuilt/model/surface_distance.h"
 
 namespace asbuilt::evaluate {
@@ -120,8 +121,40 @@ void judge_accuracy(Evaluation& evaluation, const PartPoints& points, const Tria
   if (sigma > 0.0) evaluation.relative_pose_error_sigma = *evaluation.relative_pose_error_mm / sigma;
 }
 
-ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, const TriangleMesh& model,
-                       const std::vector<Pose>& symmetries, double tolerance_mm) {
+// The part, and the symmetry by which its poses are judged: that of the truth if it names one, else found when a pose
+// first asks for it.
+class Part {
+ public:
+  Part(const TriangleMesh& mesh, const std::vector<Pose>& symmetries, double tolerance_mm, const Context& context)
+      : mesh_(mesh), symmetries_(symmetries), tolerance_mm_(tolerance_mm), context_(context) {
+    context_.progress = {};  // the evaluation has its own
+  }
+
+  [[nodiscard]] PoseError error(const Pose& ours, const Pose& truth) {
+    const PoseError plain = pose_error(ours, truth, mesh_, symmetries_);
+    if (is_right(plain) || !symmetries_.empty()) return plain;
+    if (!group_) group_ = found_group();
+    if (group_->is_trivial()) return plain;
+    const PoseError modulo = pose_error(ours, truth, mesh_, *group_);
+    return modulo.max_vertex_mm < plain.max_vertex_mm ? modulo : plain;
+  }
+  [[nodiscard]] bool is_right(const PoseError& error) const { return error.max_vertex_mm <= tolerance_mm_; }
+
+ private:
+  // A mesh that cannot be prepared has no symmetry that anyone could have used.
+  [[nodiscard]] model::SymmetryGroup found_group() const {
+    const auto prepared = model::prepare(mesh_, {}, context_);
+    return prepared ? prepared->symmetry : model::SymmetryGroup{};
+  }
+
+  const TriangleMesh& mesh_;
+  const std::vector<Pose>& symmetries_;
+  double tolerance_mm_;
+  Context context_;
+  std::optional<model::SymmetryGroup> group_;
+};
+
+ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, Part& part) {
   ScanFigures figures;
   figures.name = truth.path.filename().string();
   figures.present = truth.model_from_scan.has_value();
@@ -132,9 +165,9 @@ ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, cons
   figures.status = io::name_of(record->status);
   figures.accepted = record->status == io::ScanStatus::accepted && record->model_from_scan.has_value();
   if (figures.present && record->model_from_scan) {
-    figures.error = pose_error(*record->model_from_scan, *truth.model_from_scan, model, symmetries);
+    figures.error = part.error(*record->model_from_scan, *truth.model_from_scan);
   }
-  figures.right = figures.accepted && figures.error && figures.error->max_vertex_mm <= tolerance_mm;
+  figures.right = figures.accepted && figures.error && part.is_right(*figures.error);
   return figures;
 }
 
@@ -174,6 +207,7 @@ Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, con
   evaluation.diameter_mm = diameter(model);
   evaluation.noise_sigma_mm = truth.noise_sigma_mm;
   const double tolerance_mm = options.right_ratio * evaluation.diameter_mm;
+  Part part(model, truth.symmetries, tolerance_mm, context);
   PartPoints points;
   std::size_t known = 0;
   for (const TrueScan& scan : truth.scans) {
@@ -181,7 +215,7 @@ Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, con
     const auto found = by_name.find(scan.path.filename().string());
     const io::ScanRecord* ours = found == by_name.end() ? nullptr : &record.scans[found->second];
     known += ours != nullptr;
-    ScanFigures figures = figures_of(scan, ours, model, truth.symmetries, tolerance_mm);
+    ScanFigures figures = figures_of(scan, ours, part);
     if (ours != nullptr && figures.present && ours->model_from_scan && !scan.labels.empty()) {
       ASBUILT_TRY(labelled, read_labelled_points(truth, scan));
       if (figures.accepted) append(points, labelled, *ours->model_from_scan, *scan.model_from_scan);

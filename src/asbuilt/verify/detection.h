@@ -42,6 +42,7 @@ struct Candidate {
   double hidden_share = 0.0;           ///< share of the samples turned to the sensor that something stands in front of
   double support = 0.0;  ///< (evidence for - weighted evidence against) / all samples: candidates compete by it
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
+  double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
   double slip_loss = 0.0;          ///< share of the support that a small slip in a loose direction costs at least
   double overrun_share = 0.0;      ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;       ///< model samples that the scan confirms

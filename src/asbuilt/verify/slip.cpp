@@ -10,7 +10,7 @@
 namespace asbuilt::verify {
 namespace {
 
-constexpr int kLoosest = 3;  // directions that are tried: those of a plane
+constexpr int kLoosest = 4;  // directions that are tried: the three of a plane and one for a symmetry
 
 }  // namespace
 
@@ -25,7 +25,9 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
     const double unit = displacement_mm(stepped(model_from_scan, 1e-3 * twist, centre), model_from_scan, model) / 1e-3;
     if (!(unit > 0.0)) continue;
     for (const double sign : {-1.0, 1.0}) {
-      slipped.push_back(stepped(model_from_scan, sign * slip_mm / unit * twist, centre));
+      const Pose pose = stepped(model_from_scan, sign * slip_mm / unit * twist, centre);
+      // A turn that the part's symmetry allows is no slip.
+      if (displacement_modulo_mm(pose, model_from_scan, model) > 0.5 * slip_mm) slipped.push_back(pose);
     }
   }
   return slipped;

@@ -13,8 +13,10 @@
 #include "asbuilt/core/random.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/detect/large_planes.h"
+#include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/evidence.h"
 #include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/near_poses.h"
 #include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
 #include "asbuilt/verify/slip.h"
@@ -110,13 +112,15 @@ std::vector<Eigen::Vector3f> level_points(const scan::Scan& scan, double spacing
   return shuffled(std::move(points));
 }
 
-void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double contradiction_weight) {
+void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const model::PreparedModel& model,
+                   double contradiction_weight) {
   candidate.score = evidence.score();
   candidate.visible_share = evidence.visible_share();
   candidate.free_space_violations = evidence.free_space_share();
   candidate.hidden_share = evidence.facing > 0.0 ? evidence.hidden / evidence.facing : 0.0;
   candidate.explained_samples = static_cast<int>(evidence.explained_samples);
-  candidate.weakest_direction = evidence.weakest_direction();
+  candidate.weakest_direction = weakest_direction(evidence, model, false);
+  candidate.weakest_but_near = weakest_direction(evidence, model, true);
   const double denied = evidence.contradicted + evidence.seen_through;
   candidate.contradiction_share =
       evidence.facing > evidence.hidden ? denied / (evidence.facing - evidence.hidden) : 0.0;
@@ -144,13 +148,53 @@ class Verification {
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
       });
-      candidates = best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_);
+      candidates =
+          best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_, options_);
     }
     return candidates;
   }
 
+  // Detection may have taken the part for one of its near-symmetric poses, so the best bring theirs along. Those that
+  // stand up to a first look are registered and judged as all others.
+  [[nodiscard]] std::vector<Candidate> with_near_poses(std::vector<Candidate> candidates) const {
+    constexpr std::size_t kMostLeaders = 3, kMostNear = 8, kMostPoints = 4000;
+    constexpr double kLeaderShare = 0.7, kPromisingShare = 0.7;  // of the best support
+    if (options_.paper_mode || candidates.empty() || !model_.symmetry.has_near()) return candidates;
+    const double best_support = candidates.front().support;
+    const Level level = pyramid(model_, final_distance_).back();
+    const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
+    std::vector<Candidate> near;
+    for (std::size_t i = 0; i < std::min(kMostLeaders, candidates.size()); ++i) {
+      if (candidates[i].support < kLeaderShare * best_support) break;
+      const std::vector<Eigen::Vector3f> around =
+          points_around(shuffled_foreground_, candidates[i].model_from_scan, model_, final_distance_, kMostPoints);
+      for (const Pose& pose : near_poses(candidates[i].model_from_scan, around, model_, final_distance_)) {
+        near.push_back(candidates[i]);
+        near.back().model_from_scan = pose;
+      }
+    }
+    parallel_for(context_, near.size(), 1, [&](std::size_t i) {
+      if (!context_.cancelled()) refine_at(level, points, near[i]);
+    });
+    std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
+    near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
+    candidates.insert(candidates.end(), near.begin(), near.end());
+    return best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+  }
+
+  // Before the last registration, which takes away what the group's own inexactness adds.
+  void make_canonical(Candidate& candidate) const {
+    if (!options_.paper_mode) candidate.model_from_scan = model_.symmetry.canonical(candidate.model_from_scan);
+  }
+
+  [[nodiscard]] PoseContrast contrast_of(const Candidate& first, const Candidate& second) const {
+    return contrast(first.model_from_scan, second.model_from_scan, model_, evidence_,
+                    {final_distance_, lateral(final_distance_)});
+  }
+
   // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
   void register_densely(Candidate& candidate) const {
+    make_canonical(candidate);
     constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
     const std::vector<Eigen::Vector3f> around =
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
@@ -196,7 +240,7 @@ class Verification {
     take_evidence(candidate,
                   evidence_for(candidate.model_from_scan, samples, model_, evidence_,
                                {distance_mm, lateral(distance_mm), most_samples}),
-                  contradiction_weight);
+                  model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
   }
 
@@ -225,6 +269,8 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_normal_agreement", min_normal_agreement, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_explained_samples", min_explained_samples, 0, 1000000));
   ASBUILT_CHECK(expect_between("min_margin", min_margin, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("min_contrast", min_contrast, 0.0, 1e6));
+  ASBUILT_CHECK(expect_between("min_contrast_share", min_contrast_share, 0.5, 1.0));
   ASBUILT_CHECK(expect_between("max_free_space_share", max_free_space_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_residual_ratio", max_residual_ratio, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_contradiction_share", max_contradiction_share, 0.0, 1.0));
@@ -247,13 +293,15 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidates.push_back(candidate);
   }
   const Verification verification(scan, model, options, context);
-  candidates = verification.coarse_to_fine(std::move(candidates));
+  candidates = verification.with_near_poses(verification.coarse_to_fine(std::move(candidates)));
   parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
     if (!context.cancelled()) verification.register_densely(candidates[i]);
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
 
-  Detection detection = decide(std::move(candidates), model, options);
+  Detection detection =
+      decide(std::move(candidates), model, options,
+             [&](const Candidate& first, const Candidate& second) { return verification.contrast_of(first, second); });
   if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
     detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
     detection.status = Status::accepted;

@@ -17,9 +17,11 @@ struct VerifyOptions {
   double deviation_ratio = 0.005;  ///< as-built deviation to be expected / diameter: added to score_distance
   double acceptance_score = 0.7;   ///< Xi over the should-be-visible samples that a detection needs
   double min_normal_agreement =
-      0.75;                        ///< share of the points on the model whose normals must agree (paper: a majority)
-  int min_explained_samples = 60;  ///< model samples that must be confirmed before anything is proved
-  double min_margin = 0.03;        ///< support by which the best pose must beat any different one
+      0.75;                          ///< share of the points on the model whose normals must agree (paper: a majority)
+  int min_explained_samples = 60;    ///< model samples that must be confirmed before anything is proved
+  double min_margin = 0.03;          ///< support by which the best pose must beat any different one
+  double min_contrast = 12.0;        ///< measurements by which it must lead where the two predict different things
+  double min_contrast_share = 0.75;  ///< of these measurements, that must speak for it
   double max_free_space_share = 0.08;     ///< of should-be-visible samples seen through
   double max_residual_ratio = 0.35;       ///< RMS of the points on the model / score distance (0.58: evenly strewn)
   double max_contradiction_share = 0.08;  ///< of should-be-visible samples that the scan denies
@@ -54,6 +56,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("min_normal_agreement", options.min_normal_agreement, "share of the normals that must agree");
   field("min_explained_samples", options.min_explained_samples, "model samples that must be confirmed");
   field("min_margin", options.min_margin, "support by which the best pose must beat any different one");
+  field("min_contrast", options.min_contrast, "measurements that must tell the best pose from a similar one");
+  field("min_contrast_share", options.min_contrast_share, "share of these measurements that must speak for it");
   field("max_free_space_share", options.max_free_space_share,
         "share of the claimed surface the sensor may see through");
   field("max_residual_ratio", options.max_residual_ratio, "RMS of the points on the model / score distance");
