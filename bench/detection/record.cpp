@@ -59,7 +59,7 @@ void for_each_field(Record& record, Visitor&& field) {
   field("hidden_share", record.hidden_share);
   field("residual_ratio", record.residual_ratio);
   field("weakest_direction", record.weakest_direction);
-  field("slip_loss", record.slip_loss);
+  field("slip_lead", record.slip_lead);
   field("overrun_share", record.overrun_share);
   field("explained_samples", record.explained_samples);
   field("hypotheses", record.hypotheses);

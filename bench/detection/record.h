@@ -55,7 +55,7 @@ struct CaseRecord {
   Judged unverified;  ///< the cluster with most votes, registered; score: its votes
   double votes = 0.0, support = 0.0, visible_share = 0.0, normal_agreement = 0.0, contradiction_share = 0.0,
          hidden_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0,
-         slip_loss = 0.0, overrun_share = 0.0;
+         slip_lead = 0.0, overrun_share = 0.0;
   int explained_samples = 0;
   std::size_t hypotheses = 0;
   std::optional<std::size_t> right_rank;  ///< of the first hypothesis near the truth, before verification, from 0

@@ -3,7 +3,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
+#include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/lm_icp.h"
 #include "asbuilt/verify/verdict.h"
 
@@ -33,17 +36,15 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
   return slipped;
 }
 
-double slip_loss(const Pose& model_from_scan, const model::PreparedModel& model, double slip_mm,
-                 const ScanEvidence& scan, double contradiction_weight, const EvidenceOptions& options) {
-  const PoseEvidence here = evidence_for(model_from_scan, model.dense_samples, model, scan, options);
-  const double support = here.support(contradiction_weight);
-  if (!(support > 0.0)) return 0.0;
-  double least = 1.0;
-  for (const Pose& pose : slipped_poses(model_from_scan, here, model, slip_mm)) {
-    const PoseEvidence there = evidence_for(pose, model.dense_samples, model, scan, options);
-    least = std::min(least, 1.0 - there.support(contradiction_weight) / support);
+double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
+                             const model::PreparedModel& model, double slip_mm, const ScanEvidence& scan,
+                             const EvidenceOptions& options) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, slip_mm)) {
+    const PoseContrast seen = contrast(model_from_scan, slipped, model, scan, options);
+    least = std::min(least, seen.for_first - seen.for_second);
   }
-  return least;
+  return std::isfinite(least) ? least : 0.0;
 }
 
 }  // namespace asbuilt::verify

@@ -31,7 +31,7 @@ double proof(const Candidate& c) {
 bool is_held(const Candidate& c, const VerifyOptions& options) {
   constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
   const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
-  return c.weakest_direction >= options.min_weakest_direction ||
+  return c.weakest_direction >= options.min_weakest_direction || c.slip_lead >= options.min_contrast ||
          (c.weakest_but_near >= options.min_weakest_direction && holds_turn);
 }
 
@@ -67,11 +67,18 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
             fmt::format("the scan denies {:.0f} % of the claimed surface, at most {:.0f} % are allowed",
                         100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
   }
+  if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
+    return {Reason::contradicted,
+            fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
+                        "to something larger",
+                        100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
+  }
   if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,
-            fmt::format(
-                "the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} needed)",
-                c.weakest_direction, options.min_weakest_direction)};
+            fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
+                        "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
+                        c.weakest_direction, options.min_weakest_direction, std::max(0.0, c.slip_lead),
+                        options.min_contrast)};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",

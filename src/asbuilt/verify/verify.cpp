@@ -30,7 +30,6 @@ constexpr double kContradictionWeight = 3.0;
 
 // Of the diameter. A pose that could be displaced so far unnoticed is not known.
 constexpr double kSlip = 0.03;
-constexpr std::size_t kMostSlipSamples = 1500;
 
 // Of the diameter: how far past its edges the part's surface must not go on.
 constexpr double kRimReach = 0.03;
@@ -205,12 +204,13 @@ class Verification {
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
     }
-    judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
-    EvidenceOptions sparse{final_distance_, lateral(final_distance_), kMostSlipSamples};
-    candidate.slip_loss =
-        slip_loss(candidate.model_from_scan, model_, kSlip * model_.diameter, evidence_, kContradictionWeight, sparse);
+    const PoseEvidence evidence =
+        judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+    const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    candidate.slip_lead = least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter,
+                                                evidence_, options);
     candidate.overrun_share =
-        rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, sparse).overrun_share();
+        rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     candidate.normal_agreement =
         normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
                          options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
@@ -235,13 +235,13 @@ class Verification {
     judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
   }
 
-  void judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
-             double contradiction_weight) const {
-    take_evidence(candidate,
-                  evidence_for(candidate.model_from_scan, samples, model_, evidence_,
-                               {distance_mm, lateral(distance_mm), most_samples}),
-                  model_, contradiction_weight);
+  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
+                     double contradiction_weight) const {
+    const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_,
+                                               {distance_mm, lateral(distance_mm), most_samples});
+    take_evidence(candidate, evidence, model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
+    return evidence;
   }
 
   // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
@@ -277,6 +277,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }
