@@ -138,7 +138,6 @@ std::optional<std::size_t> first_near(std::span<const Pose> model_from_scan,
 CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan& scan) {
   CaseRecord record;
   record.seed = the_case.seed;
-  record.group = name_of(part.group);
   record.part = part.name;
   record.content = name_of(the_case.content);
   record.sensor = the_case.options.sensor;
