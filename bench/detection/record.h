@@ -50,7 +50,7 @@ struct CaseRecord {
   std::string group;  ///< the list of parts that the seed chose from: distinct, symmetric or all
   std::string part, content, stratum, sensor;
   double hidden = 1.0, occlusion = 1.0, clutter = 1.0, noise_ratio = 0.0, deviation_ratio = 0.0, diameter_mm = 0.0;
-  std::size_t points = 0;
+  std::size_t points = 0, part_points = 0;
 
   std::string status, reason_code, reason;
   Judged best;        ///< the best candidate, whatever its status; score: ours
