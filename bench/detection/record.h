@@ -46,9 +46,11 @@ struct Judged {
 /// What came of one scan: one line of cases.jsonl.
 struct CaseRecord {
   std::uint64_t seed = 0;
-  std::string mode, group, part, content, stratum, sensor;
+  std::string mode;   ///< who judged it, with what options
+  std::string group;  ///< the list of parts that the seed chose from: distinct, symmetric or all
+  std::string part, content, stratum, sensor;
   double hidden = 1.0, occlusion = 1.0, clutter = 1.0, noise_ratio = 0.0, deviation_ratio = 0.0, diameter_mm = 0.0;
-  std::size_t points = 0;
+  std::size_t points = 0, part_points = 0;
 
   std::string status, reason_code, reason;
   Judged best;        ///< the best candidate, whatever its status; score: ours
