@@ -26,7 +26,8 @@ class Contrast {
     const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
     const PointCloud& samples = model_.dense_samples;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      if (distance_at(other_from_own * samples.positions[i]) <= options_.distance_mm) continue;  // both predict it
+      const double apart = distance_at(other_from_own * samples.positions[i]);
+      if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
       const double cosine = cosine_to_sensor(scan_from_own, point, samples.normals[i], samples.positions[i]);
       if (cosine < kGrazing) continue;

@@ -56,7 +56,7 @@ class NearPoses {
       const Eigen::Isometry3f moved =
           model::rotation_about(axis.axis, axis.point, 2.0 * kPi * (turn + 0.37) / (kTurns + 1.0)).cast<float>();
       for (std::size_t i = 0; i < on_model_.size(); ++i) {
-        if (tells[i] == 0 && distance(moved * on_model_[i]) > 2.0F * distance_) tells[i] = 1;
+        if (tells[i] == 0 && distance(moved * on_model_[i]) > 0.75F * distance_) tells[i] = 1;
       }
     }
     std::vector<Eigen::Vector3f> telling;
@@ -127,14 +127,20 @@ std::vector<Pose> near_poses(const Pose& model_from_scan, std::span<const Eigen:
   return NearPoses(model_from_scan, points_in_scan, model, distance_mm).all();
 }
 
-double weakest_direction(const PoseEvidence& evidence, const model::PreparedModel& model, bool near_too) {
+std::vector<Vector6d> free_twists(const model::PreparedModel& model) {
   using Kind = model::SymmetryGroup::Kind;
   const model::SymmetryGroup& group = model.symmetry;
   std::vector<Vector6d> free;
-  if (group.kind == Kind::revolution) free.push_back(twist_about(group.axis, group.centre, model));
+  if (group.kind == Kind::revolution) free.push_back(twist_about(group.axis, group.centre, model).normalized());
   for (int i = 0; i < 3 && group.kind == Kind::sphere; ++i) {
-    free.push_back(twist_about(Eigen::Vector3d::Unit(i), group.centre, model));
+    free.push_back(twist_about(Eigen::Vector3d::Unit(i), group.centre, model).normalized());
   }
+  return free;
+}
+
+double weakest_direction(const PoseEvidence& evidence, const model::PreparedModel& model, bool near_too) {
+  const model::SymmetryGroup& group = model.symmetry;
+  std::vector<Vector6d> free = free_twists(model);
   // One is enough: two would leave a ball, which is no near-symmetry.
   if (near_too && free.empty() && !group.near_axes.empty()) {
     free.push_back(twist_about(group.near_axes.front().axis, group.near_axes.front().point, model));

@@ -19,6 +19,10 @@ namespace asbuilt::verify {
 [[nodiscard]] std::vector<Pose> near_poses(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
                                            const model::PreparedModel& model, double distance_mm);
 
+/// Unit twists, as the rows of PoseEvidence::information measure them, that the part's symmetry makes invisible: one of
+/// a part of revolution, three of a sphere.
+[[nodiscard]] std::vector<Vector6d> free_twists(const model::PreparedModel& model);
+
 /// As PoseEvidence::weakest_direction(), but turns that the part's symmetry makes invisible are no loss; neither, if
 /// `near_too`, those about axes of near-symmetry.
 [[nodiscard]] double weakest_direction(const PoseEvidence& evidence, const model::PreparedModel& model, bool near_too);

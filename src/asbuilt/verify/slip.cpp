@@ -8,18 +8,24 @@
 
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/near_poses.h"
 #include "asbuilt/verify/verdict.h"
 
 namespace asbuilt::verify {
 namespace {
 
-constexpr int kLoosest = 4;  // directions that are tried: the three of a plane and one for a symmetry
+constexpr int kLoosest = 3;  // directions that are tried: those of a plane
 
 }  // namespace
 
 std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
                                 const model::PreparedModel& model, double slip_mm) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(evidence.information);
+  // A turn that the part's symmetry makes invisible is no slip.
+  Matrix6d information = evidence.information;
+  for (const Vector6d& twist : free_twists(model)) {
+    information += 1e3 * evidence.information.trace() * twist * twist.transpose();
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
   const Eigen::Vector3d centre = model.box.center();
   std::vector<Pose> slipped;
   for (int k = 0; k < kLoosest; ++k) {
@@ -28,9 +34,7 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
     const double unit = displacement_mm(stepped(model_from_scan, 1e-3 * twist, centre), model_from_scan, model) / 1e-3;
     if (!(unit > 0.0)) continue;
     for (const double sign : {-1.0, 1.0}) {
-      const Pose pose = stepped(model_from_scan, sign * slip_mm / unit * twist, centre);
-      // A turn that the part's symmetry allows is no slip.
-      if (displacement_modulo_mm(pose, model_from_scan, model) > 0.5 * slip_mm) slipped.push_back(pose);
+      slipped.push_back(stepped(model_from_scan, sign * slip_mm / unit * twist, centre));
     }
   }
   return slipped;
