@@ -4,6 +4,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "asbuilt/scan/normals.h"
 
 namespace asbuilt::verify {
 namespace {
@@ -127,6 +130,31 @@ class Judge {
   Eigen::Vector3d parallel_direction_ = Eigen::Vector3d::Zero();
 };
 
+// n = pi r^2 / s^2 points in radius r give the slope of their plane with 2 sigma / (r sqrt(n)).
+double normal_radius_mm(double noise_sigma_mm, double spacing_mm) {
+  constexpr double kSlope = 0.1, kLeastInSpacings = 2.5;
+  const double wanted = std::sqrt(2.0 / (kSlope * std::sqrt(std::numbers::pi)) * noise_sigma_mm * spacing_mm);
+  return std::max(wanted, kLeastInSpacings * spacing_mm);
+}
+
+// Whether the model's surface goes on in its tangent plane all around, `radius` far.
+bool is_flat(const Eigen::Vector3f& on_surface, const Eigen::Vector3f& normal, float radius,
+             const model::PreparedModel& model) {
+  constexpr float kSag = 0.25F;  // a cylinder of twice the radius is flat enough
+  const Eigen::Vector3f u = radius * normal.unitOrthogonal(), v = normal.cross(u);
+  for (const Eigen::Vector3f& step : {u, v, Eigen::Vector3f(-u), Eigen::Vector3f(-v)}) {
+    if (!(std::abs(model.field->at(on_surface + step).distance) <= kSag * radius)) return false;
+  }
+  return true;
+}
+
+// Whether the wall is so thin that a point on it cannot say which of its sides it lies on.
+bool is_thin(const Eigen::Vector3f& in_model, const model::DistanceField::Sample& sample, float distance_mm,
+             const model::PreparedModel& model) {
+  const Eigen::Vector3f& normal = model.face_normals[static_cast<std::size_t>(sample.triangle)];
+  return model.field->at(in_model - (sample.distance + 2.0F * distance_mm) * normal).distance > 0.0F;
+}
+
 }  // namespace
 
 ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background)
@@ -169,24 +197,57 @@ PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples
 }
 
 double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
-                        double distance_mm, double max_angle, bool every_point) {
-  constexpr float kFlat = 0.02F;
-  const double min_cosine = std::cos(max_angle);
+                        const NormalOptions& options) {
+  const double min_cosine = std::cos(options.max_angle);
   const Eigen::Vector3f centre = (model_from_scan.inverse() * model.box.center().eval()).cast<float>();
-  const auto radius = static_cast<float>(0.5 * model.diameter + distance_mm);
+  const auto radius = static_cast<float>(0.5 * model.diameter + options.distance_mm);
   std::size_t on_model = 0, agreeing = 0;
   for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
     if ((scan.cloud.positions[i] - centre).squaredNorm() > radius * radius) continue;
-    if (!every_point && scan.surface_variation[i] > kFlat) continue;
     const Eigen::Vector3d point = model_from_scan * scan.cloud.positions[i].cast<double>();
     const model::DistanceField::Sample sample = model.field->at(point.cast<float>());
-    if (!sample.known() || std::abs(sample.distance) > distance_mm) continue;
+    if (!sample.known() || std::abs(sample.distance) > options.distance_mm) continue;
     const Eigen::Vector3d model_normal = model.face_normals[static_cast<std::size_t>(sample.triangle)].cast<double>();
     const double cosine = model_normal.dot(model_from_scan.linear() * scan.cloud.normals[i].cast<double>());
     ++on_model;
     agreeing += (scan.normals_oriented ? cosine : std::abs(cosine)) >= min_cosine ? 1 : 0;
   }
   return ratio(static_cast<double>(agreeing), static_cast<double>(on_model));
+}
+
+std::optional<double> flat_normal_agreement(const Pose& model_from_scan,
+                                            std::span<const Eigen::Vector3f> points_in_scan, const ScanEvidence& scan,
+                                            const model::PreparedModel& model, const NormalOptions& options) {
+  constexpr std::size_t kMost = 600, kFewest = 30, kFewestInFit = 6;
+  const double radius = normal_radius_mm(scan.scan.noise_sigma_mm, scan.scan.spacing_mm);
+  const auto min_cosine = static_cast<float>(std::cos(options.max_angle));
+  const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
+  const Eigen::Vector3f translation = model_from_scan.translation().cast<float>();
+  const PointCloud& cloud = scan.foreground.cloud;
+  std::vector<KdTree::Neighbour> neighbours;
+  std::size_t asked = 0, agreeing = 0;
+  for (const Eigen::Vector3f& point : points_in_scan) {
+    if (asked == kMost) break;
+    const Eigen::Vector3f in_model = rotation * point + translation;
+    const model::DistanceField::Sample sample = model.field->at(in_model);
+    if (!sample.known() || std::abs(sample.distance) > options.distance_mm) continue;
+    const Eigen::Vector3f& model_normal = model.face_normals[static_cast<std::size_t>(sample.triangle)];
+    if (!is_flat(in_model - sample.distance * model_normal, model_normal, static_cast<float>(radius), model)) continue;
+    scan.foreground_tree.within(point, static_cast<float>(radius), neighbours);
+    if (neighbours.size() < kFewestInFit) continue;
+    const auto own = std::ranges::min_element(neighbours, {}, &KdTree::Neighbour::squared_distance);
+    // The scan's own normal follows curvature but also the noise, the wider fit neither: either may agree.
+    const Eigen::Vector3f own_normal = rotation * cloud.normals[own->index];
+    const Eigen::Vector3f fitted = rotation * scan::fit_plane(cloud.positions, neighbours).normal;
+    const float turn = fitted.dot(own_normal) < 0.0F ? -1.0F : 1.0F;
+    const bool sign_counts =
+        scan.scan.normals_oriented && !is_thin(in_model, sample, static_cast<float>(options.distance_mm), model);
+    const auto agrees = [&](float cosine) { return (sign_counts ? cosine : std::abs(cosine)) >= min_cosine; };
+    ++asked;
+    agreeing += agrees(turn * model_normal.dot(fitted)) || agrees(model_normal.dot(own_normal)) ? 1 : 0;
+  }
+  if (asked < kFewest) return std::nullopt;
+  return static_cast<double>(agreeing) / static_cast<double>(asked);
 }
 
 }  // namespace asbuilt::verify

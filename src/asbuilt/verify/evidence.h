@@ -68,11 +68,22 @@ struct EvidenceOptions {
                                         const model::PreparedModel& model, const ScanEvidence& scan,
                                         const EvidenceOptions& options);
 
-/// Share of the scan points on the model (within `distance_mm`) whose normal agrees with the model's within
-/// `max_angle` radians; 0 when there are none. Signs count only where the scan knows them.
-/// Points on edges have no normal to speak of and are not asked (not so in paper mode: `every_point`).
+struct NormalOptions {
+  double distance_mm = 1.0;  ///< tau_theta: points this close are on the model
+  double max_angle = 0.5;    ///< radians up to which two normals agree
+};
+
+/// Share of the scan points on the model whose normal agrees with the model's; 0 when there are none. Signs count only
+/// where the scan knows them. The published judge (Sec. 3.1): every point with the normal it came with.
 [[nodiscard]] double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan,
-                                      const model::PreparedModel& model, double distance_mm, double max_angle,
-                                      bool every_point);
+                                      const model::PreparedModel& model, const NormalOptions& options);
+
+/// The same over at most 600 of `points_in_scan` where the model is flat as far as a normal's fit reaches, with normals
+/// fitted that far: the smallest radius at which noise tilts a normal by some 6 degrees. On narrower strips and next to
+/// edges normals mean nothing. If there are fewer than 30 such points, they have no say: nothing is returned.
+[[nodiscard]] std::optional<double> flat_normal_agreement(const Pose& model_from_scan,
+                                                          std::span<const Eigen::Vector3f> points_in_scan,
+                                                          const ScanEvidence& scan, const model::PreparedModel& model,
+                                                          const NormalOptions& options);
 
 }  // namespace asbuilt::verify

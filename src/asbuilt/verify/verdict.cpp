@@ -26,12 +26,24 @@ double proof(const Candidate& c) {
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn);
 }
 
+// Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
+// the surface does, and less may speak against it.
+double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
+  constexpr double kShare = 0.02;  // of the samples explained
+  return std::max(options.min_contrast, kShare * c.explained_samples);
+}
+
+bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
+  return c.slip_lead >= edge_measurements_needed(c, options) &&
+         c.contradiction_share <= 0.5 * options.max_contradiction_share;
+}
+
 // Details that break a near-symmetry are few among all samples, so their mean says little; the turn is held if they are
 // enough by themselves. What is further off than they reach, the near poses and their contrast tell.
 bool is_held(const Candidate& c, const VerifyOptions& options) {
   constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
   const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
-  return c.weakest_direction >= options.min_weakest_direction || c.slip_lead >= options.min_contrast ||
+  return c.weakest_direction >= options.min_weakest_direction || is_held_by_edges(c, options) ||
          (c.weakest_but_near >= options.min_weakest_direction && holds_turn);
 }
 
@@ -68,17 +80,18 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
   }
   if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
-    return {Reason::contradicted,
-            fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
-                        "to something larger",
-                        100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
+    return {
+        Reason::contradicted,
+        fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
+                    "to something larger",
+                    100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
   }
   if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,
             fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
                         "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
                         c.weakest_direction, options.min_weakest_direction, std::max(0.0, c.slip_lead),
-                        options.min_contrast)};
+                        edge_measurements_needed(c, options))};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
@@ -91,6 +104,19 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         c.score, c.normal_agreement, c.residual_ratio, proof(c), needed)};
   }
   return {};
+}
+
+bool is_refuted(const Candidate& c, const VerifyOptions& options) {
+  switch (objection(c, options).reason) {
+    case Reason::low_score:
+    case Reason::free_space_violated:
+    case Reason::contradicted:
+    case Reason::poor_fit:
+    case Reason::normals_disagree:
+      return true;
+    default:
+      return false;
+  }
 }
 
 // A rival must be nearly as well proven and explain a fair part of what the best one does; clutter that passes the
@@ -262,6 +288,10 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   }
   detection.candidates =
       best_different(std::move(candidates), kMostCandidates, kSamePose * model.diameter, model, options);
+  // A pose that the scan refutes is no rival to one that it does not; one that merely lacks proof still is.
+  if (!options.paper_mode) {
+    std::ranges::stable_partition(detection.candidates, [&](const Candidate& c) { return !is_refuted(c, options); });
+  }
   const bool is_good = objection(detection.candidates.front(), options).reason == Reason::none;
   if (is_good && compare && !options.paper_mode) put_winner_first(detection.candidates, model, options, compare);
   detection.best = detection.candidates.front();

@@ -207,13 +207,11 @@ class Verification {
     const PoseEvidence evidence =
         judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
-    candidate.slip_lead = least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter,
-                                                evidence_, options);
+    candidate.slip_lead =
+        least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter, evidence_, options);
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
-    candidate.normal_agreement =
-        normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
-                         options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
+    judge_normals(candidate);
   }
 
   void cut_out(Detection& detection) const {
@@ -233,6 +231,21 @@ class Verification {
               .model_from_scan;
     }
     judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
+  }
+
+  // The published judge asks every point; ours those whose normals mean something, and passes where there are none.
+  void judge_normals(Candidate& candidate) const {
+    constexpr std::size_t kMostPoints = 3000;
+    const NormalOptions options{final_distance_, options_.max_normal_angle_deg * std::numbers::pi / 180.0};
+    const Pose& pose = candidate.model_from_scan;
+    if (options_.paper_mode) {
+      candidate.normal_agreement = normal_agreement(pose, evidence_.foreground, model_, options);
+      return;
+    }
+    const std::vector<Eigen::Vector3f> around =
+        points_around(shuffled_foreground_, pose, model_, final_distance_, kMostPoints);
+    candidate.normal_agreement =
+        flat_normal_agreement(pose, around, evidence_, model_, options).value_or(options_.min_normal_agreement);
   }
 
   PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,

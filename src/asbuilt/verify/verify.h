@@ -17,17 +17,17 @@ struct VerifyOptions {
   double deviation_ratio = 0.005;  ///< as-built deviation to be expected / diameter: added to score_distance
   double acceptance_score = 0.7;   ///< Xi over the should-be-visible samples that a detection needs
   double min_normal_agreement =
-      0.75;                          ///< share of the points on the model whose normals must agree (paper: a majority)
+      0.65;                          ///< share of the points on the model whose normals must agree (paper: a majority)
   int min_explained_samples = 60;    ///< model samples that must be confirmed before anything is proved
   double min_margin = 0.03;          ///< support by which the best pose must beat any different one
   double min_contrast = 12.0;        ///< measurements by which it must lead where the two predict different things
   double min_contrast_share = 0.75;  ///< of these measurements, that must speak for it
-  double max_free_space_share = 0.08;     ///< of should-be-visible samples seen through
-  double max_residual_ratio = 0.35;       ///< RMS of the points on the model / score distance (0.58: evenly strewn)
-  double max_contradiction_share = 0.08;  ///< of should-be-visible samples that the scan denies
-  double min_proof = 0.34;                ///< score * normal agreement * (1 - residual ratio / 0.58)
+  double max_free_space_share = 0.08;      ///< of should-be-visible samples seen through
+  double max_residual_ratio = 0.35;        ///< RMS of the points on the model / score distance (0.58: evenly strewn)
+  double max_contradiction_share = 0.045;  ///< of should-be-visible samples that the scan denies
+  double min_proof = 0.34;                 ///< score * normal agreement * (1 - residual ratio / 0.58)
   double hidden_surcharge =
-      0.35;  ///< added to min_proof per share of the part that other things hide: what hides can lie
+      0.15;  ///< added to min_proof per share of the part that other things hide: what hides can lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
   double max_overrun_share = 0.2;         ///< of the edges past which the scan's surface may go on
   double max_normal_angle_deg = 30.0;     ///< normals closer than this agree

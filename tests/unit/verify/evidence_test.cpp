@@ -130,19 +130,32 @@ TEST(WeakestDirection, IsFirmWhereThreeSidesShow) {
 
 TEST(WeakestDirection, OfNothingIsZero) { EXPECT_EQ(PoseEvidence{}.weakest_direction(), 0.0); }
 
+// Of all points and of those on flat places, by the two judges.
+std::pair<double, double> agreements(const scan::Scan& scan, const Pose& model_from_scan) {
+  const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+  const NormalOptions options{0.5, 0.5};
+  return {normal_agreement(model_from_scan, scan, block(), options),
+          flat_normal_agreement(model_from_scan, scan.cloud.positions, evidence, block(), options).value_or(-1.0)};
+}
+
 TEST(NormalAgreement, IsFullAtTheTruePoseAndNoneWhenFlipped) {
   const Pose pose = test::pose_at(kPlace);
   scan::Scan scan = test::seen({part_at(pose)});
-  EXPECT_GT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.97);
+  EXPECT_GT(agreements(scan, pose.inverse()).first, 0.95);
+  EXPECT_GT(agreements(scan, pose.inverse()).second, 0.97);
   for (Eigen::Vector3f& normal : scan.cloud.normals) normal = -normal;
-  EXPECT_LT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.03);
+  EXPECT_LT(agreements(scan, pose.inverse()).first, 0.05);
+  EXPECT_LT(agreements(scan, pose.inverse()).second, 0.03);
   scan.normals_oriented = false;  // then a sign means nothing
-  EXPECT_GT(normal_agreement(pose.inverse(), scan, block(), 0.5, 0.5, false), 0.97);
+  EXPECT_GT(agreements(scan, pose.inverse()).first, 0.95);
+  EXPECT_GT(agreements(scan, pose.inverse()).second, 0.97);
 }
 
-TEST(NormalAgreement, WithoutPointsOnTheModelIsZero) {
-  const Pose pose = test::pose_at(kPlace);
-  EXPECT_EQ(normal_agreement(test::pose_at({900, 0, 0}), test::seen({part_at(pose)}), block(), 0.5, 0.5, false), 0.0);
+TEST(NormalAgreement, WithoutPointsOnTheModelIsZeroOrUnknown) {
+  const scan::Scan scan = test::seen({part_at(test::pose_at(kPlace))});
+  const auto [of_all, of_flat] = agreements(scan, test::pose_at({900, 0, 0}));
+  EXPECT_EQ(of_all, 0.0);
+  EXPECT_EQ(of_flat, -1.0);
 }
 
 }  // namespace

@@ -77,8 +77,28 @@ TEST(Verdict, AsksForMoreProofWhereMoreIsHidden) {
   Candidate candidate = flawless();
   candidate.score = 0.8, candidate.normal_agreement = 0.85, candidate.residual_ratio = 0.2;  // proves 0.44
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.hidden_share = 0.6;  // 0.34 + 0.35 * 0.6 = 0.55
+  candidate.hidden_share = 0.8;  // 0.34 + 0.15 * 0.8 = 0.46
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+}
+
+TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndNoContradiction) {
+  Candidate candidate = flawless();
+  candidate.weakest_direction = 0.0, candidate.explained_samples = 2000;
+  candidate.slip_lead = 30.0;  // 2 % of 2000 are 40
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+  candidate.slip_lead = 50.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.contradiction_share = 0.04;  // allowed where the surface holds it
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+}
+
+TEST(Verdict, IsNotShakenByARefutedPoseWithMoreSupport) {
+  Candidate larger_thing = flawless({0, 0, 900}), part = flawless();
+  larger_thing.support = 0.5, larger_thing.overrun_share = 0.6;
+  const Detection detection = decide({larger_thing, part}, block(), {});
+  EXPECT_EQ(detection.status, Status::accepted);
+  EXPECT_EQ(detection.best.overrun_share, 0.0);
+  EXPECT_EQ(decide({larger_thing}, block(), {}).reason, Reason::contradicted);
 }
 
 TEST(Verdict, OnASecondInstanceIsAmbiguous) {
