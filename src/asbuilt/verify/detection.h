@@ -43,9 +43,10 @@ struct Candidate {
   double support = 0.0;  ///< (evidence for - weighted evidence against) / all samples: candidates compete by it
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
   double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
-  double slip_lead = 0.0;          ///< measurements by which it leads over a small slip in any loose direction
-  double overrun_share = 0.0;      ///< share of the model's edges past which the scan's surface simply goes on
-  int explained_samples = 0;       ///< model samples that the scan confirms
+  double slip_lead =
+      0.0;  ///< measurements by which it leads over any small slip; asked where the surface alone is loose
+  double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
+  int explained_samples = 0;   ///< model samples that the scan confirms
 };
 
 enum class Status { accepted, ambiguous, rejected };
