@@ -240,8 +240,9 @@ std::optional<double> flat_normal_agreement(const Pose& model_from_scan,
     const Eigen::Vector3f own_normal = rotation * cloud.normals[own->index];
     const Eigen::Vector3f fitted = rotation * scan::fit_plane(cloud.positions, neighbours).normal;
     const float turn = fitted.dot(own_normal) < 0.0F ? -1.0F : 1.0F;
-    const bool sign_counts =
-        scan.scan.normals_oriented && !is_thin(in_model, sample, static_cast<float>(options.distance_mm), model);
+    // The sheets of an open skin may be seen from behind.
+    const bool sign_counts = scan.scan.normals_oriented && model.report.open_edges == 0 &&
+                             !is_thin(in_model, sample, static_cast<float>(options.distance_mm), model);
     const auto agrees = [&](float cosine) { return (sign_counts ? cosine : std::abs(cosine)) >= min_cosine; };
     ++asked;
     agreeing += agrees(turn * model_normal.dot(fitted)) || agrees(model_normal.dot(own_normal)) ? 1 : 0;
