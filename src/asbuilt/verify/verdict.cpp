@@ -13,8 +13,9 @@ constexpr std::size_t kMostCandidates = 10;
 constexpr double kSamePose = 0.04;   // displacement / diameter up to which two candidates are one
 constexpr double kSamePlace = 0.35;  // distance of the centres / diameter from which they are two placements
 
-Eigen::Vector3d centre_in_scan(const Candidate& candidate, const model::PreparedModel& model) {
-  return candidate.model_from_scan.inverse() * model.box.center().eval();
+double distance_of_centres_mm(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
+  const Eigen::Vector3d centre = model.box.center();
+  return (a.model_from_scan.inverse() * centre - b.model_from_scan.inverse() * centre).norm();
 }
 
 // Score, normals and fit are nearly independent witnesses, so a pose that is mediocre in all three is less credible
@@ -75,13 +76,6 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   return {};
 }
 
-// A rival must be nearly as well proven and explain a fair part of what the best one does; clutter that passes the
-// thresholds alone is not a second part beside a clear first.
-bool is_comparable(const Candidate& rival, const Candidate& best) {
-  constexpr double kProofShare = 0.75, kSupportShare = 0.25;
-  return proof(rival) >= kProofShare * proof(best) && rival.support >= kSupportShare * best.support;
-}
-
 // A different pose that would itself be accepted and explains about as much.
 Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedModel& model,
                 const VerifyOptions& options) {
@@ -89,11 +83,8 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     const Candidate& rival = candidates[i];
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
-    const double apart = (centre_in_scan(best, model) - centre_in_scan(rival, model)).norm();
-    if (apart > kSamePlace * model.diameter) {
-      return {Reason::second_instance,
-              fmt::format("the part stands in a second place, {:.0f} mm away, with score {:.2f} beside {:.2f}", apart,
-                          rival.score, best.score)};
+    if (!is_in_one_place(best, rival, model)) {
+      return {Reason::second_instance, second_instance_sentence(best, rival, model)};
     }
     if (best.support - rival.support < options.min_margin * best.support) {
       return {Reason::ambiguous_pose,
@@ -165,6 +156,26 @@ std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::si
   return kept;
 }
 
+bool is_comparable(const Candidate& rival, const Candidate& best) {
+  constexpr double kProofShare = 0.75, kSupportShare = 0.25;
+  return proof(rival) >= kProofShare * proof(best) && rival.support >= kSupportShare * best.support;
+}
+
+bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
+  return distance_of_centres_mm(a, b, model) <= kSamePlace * model.diameter;
+}
+
+bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,
+                        const VerifyOptions& options) {
+  return !is_in_one_place(best, rival, model) && is_comparable(rival, best) &&
+         objection(rival, options).reason == Reason::none;
+}
+
+std::string second_instance_sentence(const Candidate& best, const Candidate& rival, const model::PreparedModel& model) {
+  return fmt::format("the part stands in a second place, {:.0f} mm away, with score {:.2f} beside {:.2f}",
+                     distance_of_centres_mm(best, rival, model), rival.score, best.score);
+}
+
 Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options) {
   Detection detection;
   if (candidates.empty()) {
@@ -172,6 +183,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
     return detection;
   }
   detection.candidates = best_different(std::move(candidates), kMostCandidates, kSamePose * model.diameter, model);
+  for (Candidate& candidate : detection.candidates) candidate.objection = objection(candidate, options).reason;
   detection.best = detection.candidates.front();
   detection.margin = detection.best.support - (detection.candidates.size() > 1 ? detection.candidates[1].support : 0.0);
 

@@ -31,7 +31,7 @@ struct Level {
   double spacing_mm;                      ///< of the scan points used
   std::array<double, 2> robust_scale_mm;  ///< of the two passes
   double score_distance_mm;
-  std::size_t most_points;  ///< scan points that a registration takes, spread over the part
+  std::size_t most_points;   ///< scan points that a registration takes, spread over the part
   std::size_t most_samples;  ///< model samples that are asked for evidence, likewise
   std::size_t survivors;     ///< candidates that reach the next level
   const PointCloud* model_samples;
@@ -52,19 +52,23 @@ std::vector<std::uint8_t> background(const scan::Scan& scan, const model::Prepar
                                         context);
 }
 
+std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<std::uint8_t> background) {
+  for (std::size_t i = 0; i < taken.size(); ++i) background[i] |= taken[i];
+  return background;
+}
+
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
   const double d = model.sampling_distance;
-  return {
-      {{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
-       {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
-       {0.3 * d,
-        {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-        final_distance,
-        3000,
-        3000,
-        8,
-        &model.dense_samples,
-        kContradictionWeight}}};
+  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
+           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
+           {0.3 * d,
+            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+            final_distance,
+            3000,
+            3000,
+            8,
+            &model.dense_samples,
+            kContradictionWeight}}};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -84,7 +88,8 @@ std::vector<Eigen::Vector3f> points_around(const std::vector<Eigen::Vector3f>& p
   std::vector<Eigen::Vector3f> around;
   for (const Eigen::Vector3f& point : points) {
     if ((point - centre).squaredNorm() > radius * radius) continue;
-    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm))) continue;
+    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm)))
+      continue;
     around.push_back(point);
     if (around.size() == most) break;
   }
@@ -108,8 +113,11 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double co
   candidate.explained_samples = static_cast<int>(evidence.explained_samples);
   candidate.weakest_direction = evidence.weakest_direction();
   const double denied = evidence.contradicted + evidence.seen_through;
-  candidate.contradiction_share =
-      evidence.facing > evidence.hidden ? denied / (evidence.facing - evidence.hidden) : 0.0;
+  const double asked = evidence.facing - evidence.hidden;
+  candidate.contradiction_share = asked > 0.0 ? denied / asked : 0.0;
+  candidate.found_share = asked > 0.0 ? evidence.explained / asked : 0.0;
+  candidate.missing_share = asked > 0.0 ? evidence.missing / asked : 0.0;
+  candidate.facing_share = static_cast<double>(evidence.facing_samples) / static_cast<double>(evidence.samples);
   candidate.support = (evidence.explained - contradiction_weight * denied - 0.25 * evidence.missing) /
                       static_cast<double>(evidence.samples);
 }
@@ -117,12 +125,13 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double co
 class Verification {
  public:
   Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
-               const Context& context)
+               const Context& context, std::span<const std::uint8_t> taken)
       : scan_(scan),
         model_(model),
         options_(options),
         context_(context),
-        evidence_(scan, background(scan, model, options, context)),
+        background_(background(scan, model, options, context)),
+        evidence_(scan, with(taken, background_)),
         final_distance_(score_distance(scan, model, options)),
         shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)) {}
 
@@ -158,7 +167,7 @@ class Verification {
 
   void cut_out(Detection& detection) const {
     const SegmentOptions segmentation{std::max(final_distance_, 0.0075 * model_.diameter), 0.03 * model_.diameter, 0.8};
-    Segment segment = segment_part(detection.best.model_from_scan, model_, evidence_, segmentation, context_);
+    Segment segment = segment_part(detection.best.model_from_scan, model_, scan_, background_, segmentation, context_);
     detection.segment = std::move(segment.part);
     detection.margin_points = std::move(segment.margin);
   }
@@ -179,10 +188,10 @@ class Verification {
              double contradiction_weight) const {
     // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
     const double lateral = options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
-    take_evidence(candidate,
-                  evidence_for(candidate.model_from_scan, samples, model_, evidence_,
-                               {distance_mm, lateral, most_samples}),
-                  contradiction_weight);
+    take_evidence(
+        candidate,
+        evidence_for(candidate.model_from_scan, samples, model_, evidence_, {distance_mm, lateral, most_samples}),
+        contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
   }
 
@@ -190,6 +199,7 @@ class Verification {
   const model::PreparedModel& model_;
   const VerifyOptions& options_;
   const Context& context_;
+  std::vector<std::uint8_t> background_;
   ScanEvidence evidence_;
   double final_distance_;
   std::vector<Eigen::Vector3f> shuffled_foreground_;
@@ -216,7 +226,8 @@ Result<void> VerifyOptions::validate() const {
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                          std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
-                         const Context& context, bool accept_anyway) {
+                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken) {
+  ASBUILT_EXPECT(taken.empty() || taken.size() == scan.cloud.size(), "one byte a point of the scan");
   ASBUILT_CHECK(options.validate());
   std::vector<Candidate> candidates;
   for (const detect::Hypothesis& hypothesis : hypotheses) {
@@ -225,7 +236,7 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidate.votes = hypothesis.votes;
     candidates.push_back(candidate);
   }
-  const Verification verification(scan, model, options, context);
+  const Verification verification(scan, model, options, context, taken);
   candidates = verification.coarse_to_fine(std::move(candidates));
   parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
     if (!context.cancelled()) verification.register_densely(candidates[i]);
