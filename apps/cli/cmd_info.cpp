@@ -89,6 +89,10 @@ Result<void> describe_prepared(FileInfo& info, const Context& context) {
   describe_mesh(info, model.skin);
   info.notes.push_back(fmt::format("from {}, diameter {:.6g} mm, sampling distance {:.4g} mm", model.source_path,
                                    model.diameter, model.sampling_distance));
+  info.notes.push_back("symmetry: " + model.symmetry.describe());
+  if (const std::string near = model.symmetry.describe_near(); !near.empty()) {
+    info.notes.push_back("nearly the same: " + near);
+  }
   return {};
 }
 

@@ -34,12 +34,15 @@ Result<void> check_output(const std::string& path, bool force) {
 
 std::string summary(const pipeline::LoadedModel& model, const std::string& output) {
   const auto& prepared = model.prepared;
+  const std::string near = prepared.symmetry.describe_near();
   return fmt::format(
       "{}: {} triangles in the outer skin ({} read, {} inner dropped, {} flipped)\n"
       "diameter {:.6g} mm (the diagonal of the bounding box), sampling distance {:.4g} mm, {} samples\n"
+      "symmetry: {}{}\n"
       "prepared model: {}\n",
       model.record.path, prepared.skin.triangles.size(), prepared.report.triangles_in, prepared.report.inner_dropped,
-      prepared.report.flipped, prepared.diameter, prepared.sampling_distance, prepared.samples.size(), output);
+      prepared.report.flipped, prepared.diameter, prepared.sampling_distance, prepared.samples.size(),
+      prepared.symmetry.describe(), near.empty() ? "" : "; nearly the same: " + near, output);
 }
 
 Result<int> run(const Arguments& arguments, Shell& shell) {
@@ -49,11 +52,11 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   ASBUILT_TRY(model, pipeline::load_model(arguments.model, arguments.options, shell.context()));
   ASBUILT_CHECK(model::save_prepared(arguments.output, model.prepared));
   shell.print_result(summary(model, arguments.output));
-  shell.print_json(
-      fmt::format("{{\"schema\": 1, \"sha256\": \"{}\", \"triangles\": {}, \"diameter\": {}, "
-                  "\"sampling_distance\": {}, \"samples\": {}}}\n",
-                  model.record.sha256, model.record.triangles, model.record.diameter, model.record.sampling_distance,
-                  model.prepared.samples.size()));
+  shell.print_json(fmt::format(
+      "{{\"schema\": 1, \"sha256\": \"{}\", \"triangles\": {}, \"diameter\": {}, "
+      "\"sampling_distance\": {}, \"samples\": {}, \"symmetry\": \"{}\", \"near_symmetry\": \"{}\"}}\n",
+      model.record.sha256, model.record.triangles, model.record.diameter, model.record.sampling_distance,
+      model.prepared.samples.size(), model.prepared.symmetry.describe(), model.prepared.symmetry.describe_near()));
   return kDone;
 }
 

@@ -140,9 +140,14 @@ Result<CaseScan> scan_of(const Case& the_case, std::span<const SuitePart> parts,
     options.seed = Random(the_case.seed, "simulate", attempt).bits() >> 1;
     ASBUILT_TRY(simulation, simulate::simulate(mesh, options, context, decoys));
     simulate::SimulatedScan& scan = simulation.scans.front();
-    result = {{},           scan.model_from_scan,
-              scan.hidden,  scan.occlusion,
-              scan.clutter, simulation.deviation_max_mm / diameter(mesh)};
+    result = {{},
+              scan.model_from_scan,
+              scan.hidden,
+              scan.occlusion,
+              scan.clutter,
+              0,
+              simulation.deviation_max_mm / diameter(mesh)};
+    result.part_points = static_cast<std::size_t>(std::ranges::count(scan.labels, simulate::Label::kPart));
     result.points_in_scan.positions = std::move(scan.points_in_scan);
     if (the_case.content != Content::part || stratum_of(scan.hidden) == the_case.stratum) break;
   }

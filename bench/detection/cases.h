@@ -47,6 +47,7 @@ struct CaseScan {
   PointCloud points_in_scan;
   std::optional<Pose> model_from_scan;
   double hidden = 1.0, occlusion = 1.0, clutter = 1.0;  ///< as the simulator measured them
+  std::size_t part_points = 0;                          ///< of the points, those that lie on the part
   double deviation_ratio = 0.0;                         ///< largest as-built deviation / diameter
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@ struct Series {
   std::string name;
   std::vector<double> x, y;
   std::vector<double> low, high;  ///< Wilson 95 % about y; empty or as long as y
+  std::size_t colour = 0;
+  bool dashed = false;
 };
 
 struct Diagram {
@@ -22,10 +25,13 @@ struct Diagram {
   std::vector<Series> series;
 };
 
-/// Precision over recall while a threshold on the score falls: of all poses at or above it, how many are right, and how
-/// many of the scans with the part they find. Points with equal scores enter together.
-[[nodiscard]] Series precision_recall(std::string name, std::span<const CaseRecord> records,
-                                      Judged CaseRecord::*judged);
+/// Precision over recall while a threshold falls: of all poses that are trusted at least so much, how many are right,
+/// and how many of the scans with the part they find. Points with equal trust enter together.
+[[nodiscard]] Series precision_recall(std::string name, std::span<const CaseRecord> records, Judged CaseRecord::*judged,
+                                      const std::function<double(const CaseRecord&)>& trust);
+
+/// How much the judge trusts the best candidate: accepted before ambiguous before rejected, each by score.
+[[nodiscard]] double verified_trust(const CaseRecord& record);
 
 /// Recall of the accepted poses over a figure of the scans, in `bins` of about as many scans each.
 [[nodiscard]] Series recall_over(std::string name, std::span<const CaseRecord> records, double CaseRecord::*figure,

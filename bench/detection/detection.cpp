@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -104,16 +105,22 @@ Result<void> describe_parts(const Arguments& arguments) {
   return {};
 }
 
+std::map<std::string, std::vector<CaseRecord>> by_group(const std::vector<CaseRecord>& records) {
+  std::map<std::string, std::vector<CaseRecord>> groups;
+  for (const CaseRecord& record : records) groups[record.group].push_back(record);
+  return groups;
+}
+
 Result<void> summarise(const std::filesystem::path& output) {
   ASBUILT_TRY(records, read_records(output / "cases.jsonl"));
   nlohmann::ordered_json summary = summary_of(records);
   const std::string text = tables(summary);
-  // The curves are those of the distinct parts: a symmetric one is right or wrong by other rules.
-  std::erase_if(records, [](const CaseRecord& record) { return record.group != name_of(Group::distinct); });
-  for (const Diagram& diagram : diagrams_of(records)) {
-    ASBUILT_CHECK(io::write_file(output / (diagram.file + ".svg"), to_svg(diagram)));
-    for (const Series& series : diagram.series) {
-      summary["curves"][diagram.file][series.name] = {{"x", series.x}, {"y", series.y}};
+  for (const auto& [group, own] : by_group(records)) {
+    for (const Diagram& diagram : diagrams_of(own)) {
+      ASBUILT_CHECK(io::write_file(output / fmt::format("{}_{}.svg", group, diagram.file), to_svg(diagram)));
+      for (const Series& series : diagram.series) {
+        summary["curves"][group][diagram.file][series.name] = {{"x", series.x}, {"y", series.y}};
+      }
     }
   }
   ASBUILT_CHECK(io::write_file(output / "summary.json", summary.dump(1) + "\n"));
@@ -137,7 +144,7 @@ int run(int argc, char** argv) {
   summary->add_option("output", selection.output, "OUT")->required();
   CLI::App* list = app.add_subcommand("parts", "Print the parts, with brute-force figures of their symmetry");
   list->add_option("--data", selection.data, "folder with cad/; else only our own parts");
-  list->add_option("--group", selection.group, "distinct or symmetric")->capture_default_str();
+  list->add_option("--group", selection.group, "distinct, symmetric or all")->capture_default_str();
   list->add_option("--part", selection.parts, "only these");
   CLI11_PARSE(app, argc, argv);
 

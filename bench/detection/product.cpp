@@ -28,6 +28,8 @@ void note(CaseRecord& record, const verify::Detection& detection) {
   record.hidden_share = best.hidden_share;
   record.residual_ratio = best.residual_ratio;
   record.weakest_direction = best.weakest_direction;
+  record.slip_lead = best.slip_lead;
+  record.overrun_share = best.overrun_share;
   record.explained_samples = best.explained_samples;
 }
 

@@ -46,6 +46,7 @@ void for_each_field(Record& record, Visitor&& field) {
   field("deviation_ratio", record.deviation_ratio);
   field("diameter_mm", record.diameter_mm);
   field("points", record.points);
+  field("part_points", record.part_points);
   field("status", record.status);
   field("reason_code", record.reason_code);
   field("reason", record.reason);
@@ -59,6 +60,8 @@ void for_each_field(Record& record, Visitor&& field) {
   field("hidden_share", record.hidden_share);
   field("residual_ratio", record.residual_ratio);
   field("weakest_direction", record.weakest_direction);
+  field("slip_lead", record.slip_lead);
+  field("overrun_share", record.overrun_share);
   field("explained_samples", record.explained_samples);
   field("hypotheses", record.hypotheses);
   field("right_rank", record.right_rank);
@@ -136,7 +139,6 @@ std::optional<std::size_t> first_near(std::span<const Pose> model_from_scan,
 CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan& scan) {
   CaseRecord record;
   record.seed = the_case.seed;
-  record.group = name_of(part.group);
   record.part = part.name;
   record.content = name_of(the_case.content);
   record.sensor = the_case.options.sensor;
@@ -147,6 +149,7 @@ CaseRecord record_of(const Case& the_case, const SuitePart& part, const CaseScan
   record.deviation_ratio = scan.deviation_ratio;
   record.diameter_mm = diameter(part.mesh);
   record.points = scan.points_in_scan.size();
+  record.part_points = scan.part_points;
   if (!record.present()) return record;
   const std::size_t stratum = stratum_of(scan.hidden);
   record.stratum = stratum < kStrataCount ? kStrata[stratum].name : "outside";

@@ -46,15 +46,18 @@ struct Judged {
 /// What came of one scan: one line of cases.jsonl.
 struct CaseRecord {
   std::uint64_t seed = 0;
-  std::string mode, group, part, content, stratum, sensor;
+  std::string mode;   ///< who judged it, with what options
+  std::string group;  ///< the list of parts that the seed chose from: distinct, symmetric or all
+  std::string part, content, stratum, sensor;
   double hidden = 1.0, occlusion = 1.0, clutter = 1.0, noise_ratio = 0.0, deviation_ratio = 0.0, diameter_mm = 0.0;
-  std::size_t points = 0;
+  std::size_t points = 0, part_points = 0;
 
   std::string status, reason_code, reason;
   Judged best;        ///< the best candidate, whatever its status; score: ours
   Judged unverified;  ///< the cluster with most votes, registered; score: its votes
   double votes = 0.0, support = 0.0, visible_share = 0.0, normal_agreement = 0.0, contradiction_share = 0.0,
-         hidden_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0;
+         hidden_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0,
+         slip_lead = 0.0, overrun_share = 0.0;
   int explained_samples = 0;
   std::size_t hypotheses = 0;
   std::optional<std::size_t> right_rank;  ///< of the first hypothesis near the truth, before verification, from 0

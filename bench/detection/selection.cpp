@@ -49,7 +49,7 @@ void add_options(CLI::App& app, Selection& selection) {
   app.add_option("--stride", selection.stride, "only every so many-th of the seeds")->capture_default_str();
   app.add_option("--shard", selection.shard, "I/N: the I-th (from 0) of N processes")->capture_default_str();
   app.add_option("--data", selection.data, "folder with cad/ (bench/README.md); else only our own parts");
-  app.add_option("--group", selection.group, "distinct or symmetric")->capture_default_str();
+  app.add_option("--group", selection.group, "distinct, symmetric or all: the list of parts")->capture_default_str();
   app.add_option("--part", selection.parts, "only the cases of these parts");
   app.add_option("--point-share", selection.point_share, "scales the points of all scans")->capture_default_str();
   app.add_option("--threads", selection.threads, "0: all cores")->capture_default_str();
@@ -61,7 +61,9 @@ Result<std::vector<SuitePart>> suite_parts(const Selection& selection) {
     ASBUILT_TRY(more, parts_of(selection.data / "cad"));
     std::ranges::move(more, std::back_inserter(parts));
   }
-  std::erase_if(parts, [&](const SuitePart& part) { return name_of(part.group) != selection.group; });
+  if (selection.group != "all") {
+    std::erase_if(parts, [&](const SuitePart& part) { return name_of(part.group) != selection.group; });
+  }
   if (parts.empty()) {
     return fail(ErrorCode::invalid_argument, fmt::format("there is no part in the group '{}'", selection.group));
   }
@@ -113,6 +115,7 @@ Result<void> run_cases(const Selection& selection, const std::string& mode,
     ASBUILT_TRY(scan, scan_of(the_case, parts, context));
     CaseRecord record = record_of(the_case, part, scan);
     record.mode = mode;
+    record.group = selection.group;
     record.prepare_model = preparation;
     ASBUILT_CHECK(judge(record, scan));
     ASBUILT_CHECK(append(selection.output / "cases.jsonl", record));

@@ -33,8 +33,8 @@ struct Selection {
 /// The options of a subcommand that runs cases.
 void add_options(CLI::App& app, Selection& selection);
 
-/// The parts of the selection's group. They do not depend on what else is selected, so that a seed always means the
-/// same.
+/// The parts of the selection's group, or all. They do not depend on what else is selected, so that a seed always means
+/// the same.
 [[nodiscard]] Result<std::vector<SuitePart>> suite_parts(const Selection& selection);
 
 /// Its cases that have no record of this mode yet, part by part, so that each is prepared once and one at a time.

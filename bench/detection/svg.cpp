@@ -12,6 +12,8 @@ constexpr double kLeft = 70.0, kTop = 45.0, kSide = 480.0, kWidth = 900.0, kHeig
 // Okabe and Ito: told apart by colour-blind readers as well.
 constexpr std::array kColours{"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
 
+constexpr const char* kDashes = " stroke-dasharray='6 4'";
+
 double at_x(double share) { return kLeft + kSide * share; }
 double at_y(double share) { return kTop + kSide * (1.0 - share); }
 
@@ -54,7 +56,8 @@ std::string line_of(const Series& series, const char* colour) {
     bars += fmt::format("M{:.1f} {:.1f}V{:.1f}", x, at_y(series.low[i]), at_y(series.high[i]));
     dots += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3.5' fill='{}'/>\n", x, y, colour);
   }
-  std::string svg = fmt::format("<path d='{}' stroke='{}' stroke-width='2' fill='none'/>\n", path, colour);
+  std::string svg = fmt::format("<path d='{}' stroke='{}' stroke-width='2'{} fill='none'/>\n", path, colour,
+                                series.dashed ? kDashes : "");
   if (!bars.empty()) svg += fmt::format("<path d='{}' stroke='{}' stroke-opacity='0.45' fill='none'/>\n", bars, colour);
   // A curve of one point would not be seen as a line.
   if (series.low.empty() && series.x.size() == 1) {
@@ -73,13 +76,13 @@ std::string to_svg(const Diagram& diagram) {
       kWidth, kHeight);
   svg += frame(diagram);
   double row = kTop + 12.0;
-  for (std::size_t i = 0; i < diagram.series.size(); ++i) {
-    const char* colour = kColours[i % kColours.size()];
-    if (diagram.series[i].x.empty()) continue;
-    svg += line_of(diagram.series[i], colour);
-    svg += fmt::format("<path d='M{:.1f} {:.1f}h24' stroke='{}' stroke-width='3'/>\n", at_x(1.0) + 20.0, row - 5.0,
-                       colour);
-    svg += label(at_x(1.0) + 52.0, row, "start", diagram.series[i].name);
+  for (const Series& series : diagram.series) {
+    if (series.x.empty()) continue;
+    const char* colour = kColours[series.colour % kColours.size()];
+    svg += line_of(series, colour);
+    svg += fmt::format("<path d='M{:.1f} {:.1f}h30' stroke='{}' stroke-width='2'{}/>\n", at_x(1.0) + 20.0, row - 5.0,
+                       colour, series.dashed ? kDashes : "");
+    svg += label(at_x(1.0) + 58.0, row, "start", series.name);
     row += 24.0;
   }
   return svg + "</svg>\n";

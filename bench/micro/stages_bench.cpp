@@ -77,8 +77,7 @@ void BM_SparseLmIcp(benchmark::State& state) {
   verify::LmIcpResult result;
   for (auto _ : state) result = verify::lm_icp(points, start, model, scan.viewpoint, options);
   state.counters["iterations"] = result.iterations;
-  state.counters["displacement_mm"] =
-      verify::displacement_mm(result.model_from_scan, scene().model_from_scan, model);
+  state.counters["displacement_mm"] = verify::displacement_mm(result.model_from_scan, scene().model_from_scan, model);
 }
 BENCHMARK(BM_SparseLmIcp)->ArgName("points")->Arg(300)->Arg(1000)->Unit(benchmark::kMicrosecond);
 

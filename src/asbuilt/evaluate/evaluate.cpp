@@ -11,6 +11,7 @@
 #include "asbuilt/evaluate/surface_error.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/ply_writer.h"
+#include "asbuilt/model/prepared_model.h"
 #include "asbuilt/model/surface_distance.h"
 
 namespace asbuilt::evaluate {
@@ -129,6 +130,39 @@ void judge_accuracy(Evaluation& evaluation, const PartPoints& points, const Tria
   if (sigma > 0.0) evaluation.relative_pose_error_sigma = *evaluation.relative_pose_error_mm / sigma;
 }
 
+// The part, and the symmetry by which its poses are judged: that of the truth if it names one, else found when a pose
+// first asks for it.
+class Part {
+ public:
+  Part(const TriangleMesh& mesh, const std::vector<Pose>& symmetries, double tolerance_mm, const Context& context)
+      : mesh_(mesh), symmetries_(symmetries), tolerance_mm_(tolerance_mm), context_(context) {
+    context_.progress = {};  // the evaluation has its own
+  }
+
+  [[nodiscard]] PoseError error(const Pose& ours, const Pose& truth) {
+    const PoseError plain = pose_error(ours, truth, mesh_, symmetries_);
+    if (is_right(plain) || !symmetries_.empty()) return plain;
+    if (!group_) group_ = found_group();
+    if (group_->is_trivial()) return plain;
+    const PoseError modulo = pose_error(ours, truth, mesh_, *group_);
+    return modulo.max_vertex_mm < plain.max_vertex_mm ? modulo : plain;
+  }
+  [[nodiscard]] bool is_right(const PoseError& error) const { return error.max_vertex_mm <= tolerance_mm_; }
+
+ private:
+  // A mesh that cannot be prepared has no symmetry that anyone could have used.
+  [[nodiscard]] model::SymmetryGroup found_group() const {
+    const auto prepared = model::prepare(mesh_, {}, context_);
+    return prepared ? prepared->symmetry : model::SymmetryGroup{};
+  }
+
+  const TriangleMesh& mesh_;
+  const std::vector<Pose>& symmetries_;
+  double tolerance_mm_;
+  Context context_;
+  std::optional<model::SymmetryGroup> group_;
+};
+
 // A line of the evaluation: what the result says (if anything) of a place where the part stands (if it does).
 struct Line {
   std::optional<std::size_t> entry;  // of the record
@@ -138,8 +172,7 @@ struct Line {
 // Pairs the entries of a scan with its true placements, the least displaced first; each is used once. Entries without
 // a pose stand for the placements that are left. Of these further ones count only if they were looked for.
 std::vector<Line> paired(const std::vector<std::size_t>& entries, const io::RunRecord& record,
-                         const std::vector<TruePlacement>& placements, bool all_placements, const TriangleMesh& model,
-                         const std::vector<Pose>& symmetries) {
+                         const std::vector<TruePlacement>& placements, bool all_placements, Part& part) {
   struct Pair {
     double displacement_mm;
     std::size_t line, placement;
@@ -149,7 +182,7 @@ std::vector<Line> paired(const std::vector<std::size_t>& entries, const io::RunR
   for (const std::size_t entry : entries) {
     if (const auto& pose = record.scans[entry].model_from_scan) {
       for (std::size_t p = 0; p < placements.size(); ++p) {
-        const PoseError error = pose_error(*pose, placements[p].model_from_scan, model, symmetries);
+        const PoseError error = part.error(*pose, placements[p].model_from_scan);
         pairs.push_back({error.max_vertex_mm, lines.size(), p});
       }
     }
@@ -177,8 +210,8 @@ std::vector<Line> paired(const std::vector<std::size_t>& entries, const io::RunR
   return lines;
 }
 
-ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRecord& record, const TriangleMesh& model,
-                       const std::vector<Pose>& symmetries, double tolerance_mm) {
+ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRecord& record,
+                       Part& part) {
   ScanFigures figures;
   figures.name = truth.path.filename().string();
   figures.present = line.placement.has_value();
@@ -190,9 +223,9 @@ ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRec
   figures.status = io::name_of(scan.status);
   figures.accepted = scan.status == io::ScanStatus::accepted && scan.model_from_scan.has_value();
   if (figures.present && scan.model_from_scan) {
-    figures.error = pose_error(*scan.model_from_scan, line.placement->model_from_scan, model, symmetries);
+    figures.error = part.error(*scan.model_from_scan, line.placement->model_from_scan);
   }
-  figures.right = figures.accepted && figures.error && figures.error->max_vertex_mm <= tolerance_mm;
+  figures.right = figures.accepted && figures.error && part.is_right(*figures.error);
   return figures;
 }
 
@@ -233,16 +266,17 @@ Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, con
   evaluation.scans = truth.scans.size();
   const double tolerance_mm = options.right_ratio * evaluation.diameter_mm;
   const bool all_placements = looked_for_all_placements(record);
+  Part part(model, truth.symmetries, tolerance_mm, context);
   PartPoints points;
   std::size_t known = 0, done = 0;
   for (const TrueScan& scan : truth.scans) {
     if (context.cancelled()) return fail(ErrorCode::cancelled, "the evaluation was cancelled");
     const std::vector<std::size_t>& entries = by_name[scan.path.filename().string()];
     known += !entries.empty();
-    const auto lines = paired(entries, record, scan.placements(), all_placements, model, truth.symmetries);
+    const auto lines = paired(entries, record, scan.placements(), all_placements, part);
     std::optional<LabelledPoints> labelled;
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      ScanFigures figures = figures_of(scan, lines[i], record, model, truth.symmetries, tolerance_mm);
+      ScanFigures figures = figures_of(scan, lines[i], record, part);
       if (i > 0) figures.name += fmt::format("#{}", i + 1);
       if (figures.error && !scan.labels.empty()) {
         if (!labelled) {

@@ -52,4 +52,11 @@ PoseError pose_error(const Pose& model_from_scan, const Pose& true_model_from_sc
   return best;
 }
 
+PoseError pose_error(const Pose& model_from_scan, const Pose& true_model_from_scan, const TriangleMesh& model,
+                     const model::SymmetryGroup& group) {
+  const Pose ours_from_true = model_from_scan * true_model_from_scan.inverse();
+  const Pose element = group.closest_element(ours_from_true, bounding_box(model));
+  return pose_error(model_from_scan, element * true_model_from_scan, model);
+}
+
 }  // namespace asbuilt::evaluate

@@ -5,6 +5,7 @@
 
 #include "asbuilt/core/pose.h"
 #include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/model/symmetry.h"
 
 namespace asbuilt::evaluate {
 
@@ -21,5 +22,9 @@ struct PoseError {
 /// identity is always among them): the one that leaves the smallest largest displacement is taken.
 [[nodiscard]] PoseError pose_error(const Pose& model_from_scan, const Pose& true_model_from_scan,
                                    const TriangleMesh& model, std::span<const Pose> symmetries = {});
+
+/// The same modulo a symmetry group: the true pose is composed with the element that brings it closest to ours.
+[[nodiscard]] PoseError pose_error(const Pose& model_from_scan, const Pose& true_model_from_scan,
+                                   const TriangleMesh& model, const model::SymmetryGroup& group);
 
 }  // namespace asbuilt::evaluate

@@ -23,7 +23,7 @@ constexpr std::string_view kMagic(
     "\x89"
     "ASBUILT-MODEL\r\n",
     16);
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kDigestSize = 64;                                                  // hexadecimal digits
 constexpr std::size_t kHeaderSize = 16 + sizeof(std::uint32_t) + sizeof(std::uint64_t);  // magic, version, body's size
 
@@ -48,12 +48,69 @@ void transfer(PreparedModel& model, const Stream& stream) {
   stream(model.source_sha256);
 }
 
+// Four columns a motion: those of the rotation, then the translation.
+using Columns = std::vector<Eigen::Vector3d>;
+
+void append(Columns& columns, const Pose& motion) {
+  for (int i = 0; i < 3; ++i) columns.emplace_back(motion.linear().col(i));
+  columns.emplace_back(motion.translation());
+}
+
+Pose motion_at(const Columns& columns, std::size_t index) {
+  Pose motion = Pose::Identity();
+  for (std::size_t i = 0; i < 3; ++i) motion.linear().col(static_cast<Eigen::Index>(i)) = columns[4 * index + i];
+  motion.translation() = columns[4 * index + 3];
+  return motion;
+}
+
+// Shares stand in a column of their own; a vector has three numbers.
+Eigen::Vector3d share_column(double share) { return {share, 0.0, 0.0}; }
+
+void write_symmetry(const SymmetryGroup& group, ByteWriter& writer) {
+  Columns columns{group.centre, group.axis}, near, axes;
+  for (const Pose& element : group.elements) append(columns, element);
+  for (const NearSymmetry& n : group.near) {
+    append(near, n.motion);
+    near.insert(near.end(), {n.breaks_at, share_column(n.share)});
+  }
+  for (const NearAxis& a : group.near_axes) axes.insert(axes.end(), {a.axis, a.point, share_column(a.share)});
+  writer.put(static_cast<std::uint64_t>(group.kind));
+  writer.put(static_cast<std::uint64_t>(group.order));
+  for (const Columns& list : {columns, near, axes}) writer.put(list);
+}
+
+bool read_symmetry(ByteReader& reader, SymmetryGroup& group) {
+  std::uint64_t kind = 0, order = 0;
+  Columns columns, near, axes;
+  reader.get(kind);
+  reader.get(order);
+  for (Columns* list : {&columns, &near, &axes}) reader.get(*list);
+  constexpr auto kLastKind = static_cast<std::uint64_t>(SymmetryGroup::Kind::sphere);
+  const bool has_shape = columns.size() >= 6 && columns.size() % 4 == 2 && near.size() % 6 == 0 && axes.size() % 3 == 0;
+  if (!reader.ok() || kind > kLastKind || order > 1000000 || !has_shape) return false;
+  group.kind = static_cast<SymmetryGroup::Kind>(kind);
+  group.order = static_cast<int>(order);
+  group.centre = columns[0];
+  group.axis = columns[1];
+  group.elements.clear();
+  const Columns motions(columns.begin() + 2, columns.end());
+  for (std::size_t i = 0; 4 * i < motions.size(); ++i) group.elements.push_back(motion_at(motions, i));
+  for (std::size_t i = 0; i < near.size(); i += 6) {
+    const Columns entry(near.begin() + static_cast<std::ptrdiff_t>(i),
+                        near.begin() + static_cast<std::ptrdiff_t>(i + 6));
+    group.near.push_back({motion_at(entry, 0), entry[5].x(), entry[4]});
+  }
+  for (std::size_t i = 0; i < axes.size(); i += 3) group.near_axes.push_back({axes[i], axes[i + 1], axes[i + 2].x()});
+  return true;
+}
+
 std::string body_of(PreparedModel model) {
   ByteWriter writer;
   transfer(model, [&](const auto& member) { writer.put(member); });
   for (const std::size_t* count : counts_of(model.report)) writer.put(static_cast<std::uint64_t>(*count));
   writer.put(static_cast<std::uint64_t>(model.report.notes.size()));
   for (const std::string& note : model.report.notes) writer.put(note);
+  write_symmetry(model.symmetry, writer);
   return writer.bytes();
 }
 
@@ -68,7 +125,7 @@ bool read_body(std::string_view body, PreparedModel& model) {
   std::uint64_t notes = 0;
   reader.get(notes);
   for (std::uint64_t i = 0; i < notes && reader.ok(); ++i) reader.get(model.report.notes.emplace_back());
-  return reader.at_end();
+  return read_symmetry(reader, model.symmetry) && reader.at_end();
 }
 
 template <class Points>
@@ -77,6 +134,17 @@ bool all_finite(const Points& points) {
 }
 
 // The digest tells damage; this tells a file that was written wrongly, before it can hurt.
+bool is_consistent(const SymmetryGroup& group) {
+  const auto is_motion = [](const Pose& motion) { return is_rigid(motion.matrix()); };
+  const auto is_axis = [](const Eigen::Vector3d& axis, const Eigen::Vector3d& point) {
+    return std::abs(axis.norm() - 1.0) < 1e-6 && point.allFinite();
+  };
+  return is_axis(group.axis, group.centre) && std::ranges::all_of(group.elements, is_motion) &&
+         group.elements.front().matrix() == Eigen::Matrix4d::Identity() &&
+         std::ranges::all_of(group.near, [&](const NearSymmetry& near) { return is_motion(near.motion); }) &&
+         std::ranges::all_of(group.near_axes, [&](const NearAxis& near) { return is_axis(near.axis, near.point); });
+}
+
 bool is_consistent(const PreparedModel& model) {
   const auto in_range = [&](const Eigen::Vector3i& t) {
     return t.minCoeff() >= 0 && static_cast<std::size_t>(t.maxCoeff()) < model.skin.vertices.size();
@@ -89,7 +157,7 @@ bool is_consistent(const PreparedModel& model) {
                         model.sampling_distance <= model.diameter;
   return has_size && !model.skin.empty() && all_finite(model.skin.vertices) &&
          std::ranges::all_of(model.skin.triangles, in_range) && is_oriented(model.samples) &&
-         is_oriented(model.dense_samples);
+         is_oriented(model.dense_samples) && is_consistent(model.symmetry);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "asbuilt/model/sample_normals.h"
 #include "asbuilt/model/sampling_choice.h"
 #include "asbuilt/model/search_structures.h"
+#include "asbuilt/model/symmetry_search.h"
 
 namespace asbuilt::model {
 namespace {
@@ -159,6 +160,9 @@ Result<PreparedModel> prepare(const TriangleMesh& mesh, const ModelOptions& opti
   context.report_progress(0.6);
 
   build_search_structures(model, context);
+  if (context.cancelled()) return cancelled();
+  context.report_progress(0.9);
+  model.symmetry = find_symmetry(model, context);
   if (context.cancelled()) return cancelled();
   context.report_progress(1.0);
   return model;

@@ -12,6 +12,7 @@
 #include "asbuilt/model/distance_field.h"
 #include "asbuilt/model/ray_scene.h"
 #include "asbuilt/model/surface_distance.h"
+#include "asbuilt/model/symmetry.h"
 
 namespace asbuilt::model {
 
@@ -53,6 +54,7 @@ struct PreparedModel {
   std::shared_ptr<const SurfaceDistance> surface;
   std::shared_ptr<const DistanceField> field;
   std::shared_ptr<const RayScene> rays;
+  SymmetryGroup symmetry;  ///< the rotations that map the part onto itself, and those that nearly do
   PreparationReport report;
   std::string source_path, source_sha256;  ///< of the file it came from, set by whoever read it; may be empty
 };

@@ -35,8 +35,12 @@ Result<LoadedModel> load_model(const std::string& path, const Options& options, 
   for (const std::string& note : prepared.report.notes) context.warn(fmt::format("{}: {}", path, note));
   // A prepared model is the same model as the mesh it came from.
   if (!prepared.source_sha256.empty()) sha256 = prepared.source_sha256;
-  loaded.record = {
-      path, std::move(sha256), prepared.skin.triangles.size(), prepared.diameter, prepared.sampling_distance, "none"};
+  loaded.record = {path,
+                   std::move(sha256),
+                   prepared.skin.triangles.size(),
+                   prepared.diameter,
+                   prepared.sampling_distance,
+                   prepared.symmetry.describe()};
   loaded.prepared = std::move(prepared);
   return loaded;
 }

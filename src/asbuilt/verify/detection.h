@@ -45,6 +45,9 @@ struct Candidate {
   double missing_share = 0.0;          ///< ... and those where it has no return; the rest is contradiction_share
   double support = 0.0;  ///< (evidence for - weighted evidence against) / all samples: candidates compete by it
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
+  double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
+  double slip_lead = 0.0;          ///< measurements by which it leads over a small slip in any loose direction
+  double overrun_share = 0.0;      ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;       ///< model samples that the scan confirms
   Reason objection = Reason::none;  ///< what stands against it on its own, whatever its rivals
 };

@@ -149,6 +149,11 @@ double PoseEvidence::weakest_direction() const {
   return std::max(0.0, solver.eigenvalues()[0]) / static_cast<double>(explained_samples);
 }
 
+double PoseEvidence::support(double contradiction_weight) const {
+  return ratio(explained - contradiction_weight * (contradicted + seen_through) - 0.25 * missing,
+               static_cast<double>(samples));
+}
+
 double PoseEvidence::free_space_share() const { return ratio(seen_through, facing - hidden); }
 
 double PoseEvidence::visible_share() const {

@@ -49,6 +49,8 @@ struct PoseEvidence {
   /// Smallest eigenvalue of the information per explained sample: 0 if the part can slide or turn without leaving the
   /// surface that was found (a plane, a cylinder).
   [[nodiscard]] double weakest_direction() const;
+  /// For minus against: what candidates compete by, per sample asked.
+  [[nodiscard]] double support(double contradiction_weight) const;
 
   /// Xi over what should be visible and is not hidden; a missing return counts half.
   [[nodiscard]] double score() const;

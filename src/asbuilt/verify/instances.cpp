@@ -16,25 +16,16 @@ constexpr std::size_t kMostInstances = 20;
 /// A placement with what its own verdict leaves to be settled by the others.
 struct Placement {
   Detection detection;
-  std::vector<Candidate> rivals_elsewhere;
+  std::vector<Candidate> rivals_elsewhere;  ///< that may be placements of their own
 };
 
-// The verdict among poses in one place; rivals elsewhere, which may be placements of their own, are set aside.
-Placement judged_in_its_place(Detection detection, const model::PreparedModel& model, const VerifyOptions& options) {
-  Placement placement;
-  std::vector<Candidate> in_place;
+std::vector<Candidate> rivals_elsewhere(const Detection& detection, const model::PreparedModel& model,
+                                        const VerifyOptions& options) {
+  std::vector<Candidate> rivals;
   for (const Candidate& candidate : detection.candidates) {
-    const bool elsewhere = is_second_instance(detection.best, candidate, model, options);
-    (elsewhere ? placement.rivals_elsewhere : in_place).push_back(candidate);
+    if (is_second_instance(detection.best, candidate, model, options)) rivals.push_back(candidate);
   }
-  if (detection.reason == Reason::second_instance) {
-    Detection alone = decide(std::move(in_place), model, options);
-    alone.segment = std::move(detection.segment);
-    alone.margin_points = std::move(detection.margin_points);
-    detection = std::move(alone);
-  }
-  placement.detection = std::move(detection);
-  return placement;
+  return rivals;
 }
 
 // A rival elsewhere that became no placement has no points of its own: it explains those of this one.
@@ -51,7 +42,6 @@ void settle_rivals(std::vector<Placement>& placements, const model::PreparedMode
       detection.reason = Reason::second_instance;
       detection.explanation = second_instance_sentence(detection.best, rival, model) +
                               ", but the two explain the same points, so that one of them is wrong";
-      detection.candidates.push_back(rival);
       break;
     }
   }
@@ -76,7 +66,8 @@ Result<std::vector<Detection>> verify_instances(const scan::Scan& scan, const mo
     const bool is_further = !placements.empty();
     if (is_further && (rejected || !is_comparable(detection.best, placements.front().detection.best))) break;
     for (const std::uint32_t i : detection.segment) taken[i] = 1;
-    placements.push_back(judged_in_its_place(std::move(detection), model, options));
+    std::vector<Candidate> rivals = rivals_elsewhere(detection, model, options);
+    placements.push_back({std::move(detection), std::move(rivals)});
     if (rejected || options.paper_mode) break;
   }
   settle_rivals(placements, model);

@@ -112,10 +112,6 @@ class Problem {
   Eigen::Vector3d pivot_;
 };
 
-Pose stepped(const Pose& pose, const Vector6d& step, const Eigen::Vector3d& pivot) {
-  return Eigen::Translation3d(pivot) * pose_from_twist(step) * Eigen::Translation3d(-pivot) * pose;
-}
-
 // Directions that nothing holds (sliding along a plane) get no step instead of a huge one.
 Vector6d damped_step(const NormalEquations& equations, double damping) {
   Matrix6d system = equations.information;
@@ -133,6 +129,11 @@ FieldResidual field_residual(const model::DistanceField::Sample& sample, const E
   result.value = static_cast<double>(sample.distance);
   result.derivative << (point_in_model - pivot_in_model).cross(gradient), gradient;
   return result;
+}
+
+Pose stepped(const Pose& model_from_scan, const Vector6d& twist, const Eigen::Vector3d& pivot_in_model) {
+  return Eigen::Translation3d(pivot_in_model) * pose_from_twist(twist) * Eigen::Translation3d(-pivot_in_model) *
+         model_from_scan;
 }
 
 LmIcpResult lm_icp(std::span<const Eigen::Vector3f> points_in_scan, const Pose& model_from_scan,

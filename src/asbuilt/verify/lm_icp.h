@@ -35,6 +35,9 @@ struct FieldResidual {
                                            const Eigen::Vector3d& point_in_model,
                                            const Eigen::Vector3d& pivot_in_model);
 
+/// A pose after a left twist about `pivot`.
+[[nodiscard]] Pose stepped(const Pose& model_from_scan, const Vector6d& twist, const Eigen::Vector3d& pivot_in_model);
+
 /// Sparse LM-ICP (Sec. 3.1; Fitzgibbon 2003): Levenberg-Marquardt on robust distances read from the distance field,
 /// with analytic derivatives and no search in the loop. Normals of the scan play no part: they judge afterwards.
 /// Single threaded and deterministic.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 namespace asbuilt::verify {
 namespace {
@@ -23,6 +25,15 @@ double distance_of_centres_mm(const Candidate& a, const Candidate& b, const mode
 double proof(const Candidate& c) {
   const double evenly_strewn = 1.0 / std::sqrt(3.0);
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn);
+}
+
+// Details that break a near-symmetry are few among all samples, so their mean says little; the turn is held if they are
+// enough by themselves. What is further off than they reach, the near poses and their contrast tell.
+bool is_held(const Candidate& c, const VerifyOptions& options) {
+  constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
+  const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
+  return c.weakest_direction >= options.min_weakest_direction || c.slip_lead >= options.min_contrast ||
+         (c.weakest_but_near >= options.min_weakest_direction && holds_turn);
 }
 
 struct Finding {
@@ -57,11 +68,18 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
             fmt::format("the scan denies {:.0f} % of the claimed surface, at most {:.0f} % are allowed",
                         100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
   }
-  if (!options.paper_mode && c.weakest_direction < options.min_weakest_direction) {
+  if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
+    return {Reason::contradicted,
+            fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
+                        "to something larger",
+                        100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
+  }
+  if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,
-            fmt::format(
-                "the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} needed)",
-                c.weakest_direction, options.min_weakest_direction)};
+            fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
+                        "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
+                        c.weakest_direction, options.min_weakest_direction, std::max(0.0, c.slip_lead),
+                        options.min_contrast)};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
@@ -76,24 +94,92 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   return {};
 }
 
-// A different pose that would itself be accepted and explains about as much.
+enum class Outcome { first, second, undecided };
+
+Outcome winner(const PoseContrast& contrast, const VerifyOptions& options) {
+  const double lead = contrast.for_first - contrast.for_second;
+  if (std::abs(lead) < options.min_contrast) return Outcome::undecided;
+  if (std::max(contrast.for_first, contrast.for_second) < options.min_contrast_share * contrast.total()) {
+    return Outcome::undecided;
+  }
+  return lead > 0.0 ? Outcome::first : Outcome::second;
+}
+
+double turn_deg(const Candidate& a, const Candidate& b) {
+  return rotation_angle(a.model_from_scan.linear() * b.model_from_scan.linear().transpose()) * 180.0 / std::numbers::pi;
+}
+
+Finding too_alike(const Candidate& best, const Candidate& rival, const std::optional<PoseContrast>& contrast,
+                  const model::PreparedModel& model, const VerifyOptions& options) {
+  const double apart = displacement_modulo_mm(best.model_from_scan, rival.model_from_scan, model);
+  if (contrast && contrast->total() < options.min_contrast) {
+    return {Reason::ambiguous_pose,
+            fmt::format("the scan does not show what tells the pose from one that is turned by {:.0f} degrees and "
+                        "differs by up to {:.1f} mm: {:.0f} measurements there, {:.0f} are needed",
+                        turn_deg(best, rival), apart, contrast->total(), options.min_contrast)};
+  }
+  std::string where_they_differ;
+  if (contrast) {
+    where_they_differ = fmt::format("; where the two differ, {:.0f} measurements speak for it and {:.0f} for the other",
+                                    contrast->for_first, contrast->for_second);
+  }
+  return {Reason::ambiguous_pose,
+          fmt::format("a pose that differs by up to {:.1f} mm explains the scan about as well: score {:.3f} beside "
+                      "{:.3f}{}",
+                      apart, rival.score, best.score, where_they_differ)};
+}
+
+// Different poses in the same place that would be accepted too: what both predict supports both, so only the rest
+// counts. The one that wins there goes to the front, also against a small lead in support.
+void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedModel& model,
+                      const VerifyOptions& options, const Comparison& compare) {
+  for (std::size_t i = 1; i < candidates.size(); ++i) {
+    const Candidate &best = candidates.front(), &rival = candidates[i];
+    const bool is_close = best.support - rival.support < options.min_margin * best.support;
+    if (!is_close || !is_in_one_place(best, rival, model)) continue;
+    if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
+    if (winner(compare(best, rival), options) != Outcome::second) continue;
+    std::rotate(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(i),
+                candidates.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  }
+}
+
+// A different pose that would itself be accepted and that nothing tells from the best.
 Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedModel& model,
-                const VerifyOptions& options) {
+                const VerifyOptions& options, const Comparison& compare, bool one_of_several) {
   const Candidate& best = candidates.front();
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     const Candidate& rival = candidates[i];
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
     if (!is_in_one_place(best, rival, model)) {
+      if (one_of_several) continue;
       return {Reason::second_instance, second_instance_sentence(best, rival, model)};
     }
-    if (best.support - rival.support < options.min_margin * best.support) {
-      return {Reason::ambiguous_pose,
-              fmt::format(
-                  "a pose that differs by up to {:.1f} mm explains the scan about as well: score {:.3f} beside {:.3f}",
-                  displacement_mm(best.model_from_scan, rival.model_from_scan, model), rival.score, best.score)};
+    std::optional<PoseContrast> contrast;
+    if (compare) contrast = compare(best, rival);
+    const Outcome outcome = contrast ? winner(*contrast, options) : Outcome::undecided;
+    const bool leads = best.support - rival.support >= options.min_margin * best.support;
+    if (outcome == Outcome::second || (outcome == Outcome::undecided && !leads)) {
+      return too_alike(best, rival, contrast, model, options);
     }
   }
   return {};
+}
+
+// Loose in nothing but a turn about an axis of near-symmetry: the place is known, the angle is not.
+Finding unknown_turn(Candidate c, const VerifyOptions& options) {
+  if (options.paper_mode || c.weakest_but_near < options.min_weakest_direction) return {};
+  c.weakest_direction = c.weakest_but_near;
+  if (objection(c, options).reason != Reason::none) return {};
+  return {Reason::ambiguous_pose,
+          "the scan does not show what tells the part's turns about its axis of near-symmetry from one another"};
+}
+
+std::string acceptance(const Candidate& best, const model::PreparedModel& model, const VerifyOptions& options) {
+  const std::string found = fmt::format("{:.0f} % of what should be visible was found, {:.0f} % of the normals agree",
+                                        100.0 * best.score, 100.0 * best.normal_agreement);
+  if (options.paper_mode || model.symmetry.is_trivial()) return found;
+  return fmt::format("{}; the pose is known modulo the part's symmetry ({})", found, model.symmetry.describe());
 }
 
 }  // namespace
@@ -133,23 +219,22 @@ const char* code_of(Reason reason) {
 }
 
 double displacement_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
-  const Pose b_from_a = b_from_scan * a_from_scan.inverse();
-  double largest = 0.0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d point = model.box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
-    largest = std::max(largest, (b_from_a * point - point).norm());
-  }
-  return largest;
+  return model::largest_displacement_mm(b_from_scan * a_from_scan.inverse(), model.box);
+}
+
+double displacement_modulo_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
+  return model::displacement_modulo_mm(b_from_scan * a_from_scan.inverse(), model.symmetry, model.box);
 }
 
 std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::size_t most, double least_apart_mm,
-                                      const model::PreparedModel& model) {
+                                      const model::PreparedModel& model, const VerifyOptions& options) {
+  const auto apart = options.paper_mode ? displacement_mm : displacement_modulo_mm;
   std::ranges::stable_sort(candidates, std::ranges::greater{}, &Candidate::support);
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {
     if (kept.size() == most) break;
     const bool is_new = std::ranges::none_of(kept, [&](const Candidate& other) {
-      return displacement_mm(other.model_from_scan, candidate.model_from_scan, model) <= least_apart_mm;
+      return apart(other.model_from_scan, candidate.model_from_scan, model) <= least_apart_mm;
     });
     if (is_new) kept.push_back(candidate);
   }
@@ -176,31 +261,40 @@ std::string second_instance_sentence(const Candidate& best, const Candidate& riv
                      distance_of_centres_mm(best, rival, model), rival.score, best.score);
 }
 
-Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options) {
+Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options,
+                 const Comparison& compare, bool one_of_several) {
   Detection detection;
   if (candidates.empty()) {
     detection.explanation = "no pose of the part was proposed";
     return detection;
   }
-  detection.candidates = best_different(std::move(candidates), kMostCandidates, kSamePose * model.diameter, model);
+  detection.candidates =
+      best_different(std::move(candidates), kMostCandidates, kSamePose * model.diameter, model, options);
   for (Candidate& candidate : detection.candidates) candidate.objection = objection(candidate, options).reason;
+  const bool is_good = objection(detection.candidates.front(), options).reason == Reason::none;
+  if (is_good && compare && !options.paper_mode) put_winner_first(detection.candidates, model, options, compare);
   detection.best = detection.candidates.front();
   detection.margin = detection.best.support - (detection.candidates.size() > 1 ? detection.candidates[1].support : 0.0);
 
   Finding finding = objection(detection.best, options);
+  if (finding.reason == Reason::under_constrained) {
+    if (Finding turn = unknown_turn(detection.best, options); turn.reason != Reason::none) {
+      detection.status = Status::ambiguous;
+      detection.reason = turn.reason;
+      detection.explanation = std::move(turn.explanation);
+      return detection;
+    }
+  }
   if (finding.reason != Reason::none) {
     detection.reason = finding.reason;
     detection.explanation = std::move(finding.explanation);
     return detection;
   }
-  if (!options.paper_mode) finding = rivalry(detection.candidates, model, options);
+  if (!options.paper_mode) finding = rivalry(detection.candidates, model, options, compare, one_of_several);
   detection.reason = finding.reason;
   detection.status = finding.reason == Reason::none ? Status::accepted : Status::ambiguous;
   detection.explanation =
-      finding.reason == Reason::none
-          ? fmt::format("{:.0f} % of what should be visible was found, {:.0f} % of the normals agree",
-                        100.0 * detection.best.score, 100.0 * detection.best.normal_agreement)
-          : std::move(finding.explanation);
+      finding.reason == Reason::none ? acceptance(detection.best, model, options) : std::move(finding.explanation);
   return detection;
 }
 

@@ -13,9 +13,13 @@
 #include "asbuilt/core/random.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/detect/large_planes.h"
+#include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/evidence.h"
 #include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/near_poses.h"
+#include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
+#include "asbuilt/verify/slip.h"
 #include "asbuilt/verify/verdict.h"
 
 namespace asbuilt::verify {
@@ -23,6 +27,13 @@ namespace {
 
 // Log odds: a contradiction is rare at a right pose and common at a wrong one; agreement is common at both.
 constexpr double kContradictionWeight = 3.0;
+
+// Of the diameter. A pose that could be displaced so far unnoticed is not known.
+constexpr double kSlip = 0.03;
+
+// Of the diameter: how far past its edges the part's surface must not go on.
+constexpr double kRimReach = 0.03;
+constexpr std::size_t kMostRimSamples = 3000;
 
 constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
 
@@ -105,21 +116,22 @@ std::vector<Eigen::Vector3f> level_points(const scan::Scan& scan, double spacing
   return shuffled(std::move(points));
 }
 
-void take_evidence(Candidate& candidate, const PoseEvidence& evidence, double contradiction_weight) {
+void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const model::PreparedModel& model,
+                   double contradiction_weight) {
   candidate.score = evidence.score();
   candidate.visible_share = evidence.visible_share();
   candidate.free_space_violations = evidence.free_space_share();
   candidate.hidden_share = evidence.facing > 0.0 ? evidence.hidden / evidence.facing : 0.0;
   candidate.explained_samples = static_cast<int>(evidence.explained_samples);
-  candidate.weakest_direction = evidence.weakest_direction();
+  candidate.weakest_direction = weakest_direction(evidence, model, false);
+  candidate.weakest_but_near = weakest_direction(evidence, model, true);
   const double denied = evidence.contradicted + evidence.seen_through;
   const double asked = evidence.facing - evidence.hidden;
   candidate.contradiction_share = asked > 0.0 ? denied / asked : 0.0;
   candidate.found_share = asked > 0.0 ? evidence.explained / asked : 0.0;
   candidate.missing_share = asked > 0.0 ? evidence.missing / asked : 0.0;
   candidate.facing_share = static_cast<double>(evidence.facing_samples) / static_cast<double>(evidence.samples);
-  candidate.support = (evidence.explained - contradiction_weight * denied - 0.25 * evidence.missing) /
-                      static_cast<double>(evidence.samples);
+  candidate.support = evidence.support(contradiction_weight);
 }
 
 class Verification {
@@ -133,7 +145,9 @@ class Verification {
         background_(background(scan, model, options, context)),
         evidence_(scan, with(taken, background_)),
         final_distance_(score_distance(scan, model, options)),
-        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)) {}
+        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
+        rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
+        rim_probes_(rim_probes(model, rim_reach_, kMostRimSamples)) {}
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
   [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates) const {
@@ -142,13 +156,53 @@ class Verification {
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
       });
-      candidates = best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_);
+      candidates =
+          best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_, options_);
     }
     return candidates;
   }
 
+  // Detection may have taken the part for one of its near-symmetric poses, so the best bring theirs along. Those that
+  // stand up to a first look are registered and judged as all others.
+  [[nodiscard]] std::vector<Candidate> with_near_poses(std::vector<Candidate> candidates) const {
+    constexpr std::size_t kMostLeaders = 3, kMostNear = 8, kMostPoints = 4000;
+    constexpr double kLeaderShare = 0.7, kPromisingShare = 0.7;  // of the best support
+    if (options_.paper_mode || candidates.empty() || !model_.symmetry.has_near()) return candidates;
+    const double best_support = candidates.front().support;
+    const Level level = pyramid(model_, final_distance_).back();
+    const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
+    std::vector<Candidate> near;
+    for (std::size_t i = 0; i < std::min(kMostLeaders, candidates.size()); ++i) {
+      if (candidates[i].support < kLeaderShare * best_support) break;
+      const std::vector<Eigen::Vector3f> around =
+          points_around(shuffled_foreground_, candidates[i].model_from_scan, model_, final_distance_, kMostPoints);
+      for (const Pose& pose : near_poses(candidates[i].model_from_scan, around, model_, final_distance_)) {
+        near.push_back(candidates[i]);
+        near.back().model_from_scan = pose;
+      }
+    }
+    parallel_for(context_, near.size(), 1, [&](std::size_t i) {
+      if (!context_.cancelled()) refine_at(level, points, near[i]);
+    });
+    std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
+    near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
+    candidates.insert(candidates.end(), near.begin(), near.end());
+    return best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+  }
+
+  // Before the last registration, which takes away what the group's own inexactness adds.
+  void make_canonical(Candidate& candidate) const {
+    if (!options_.paper_mode) candidate.model_from_scan = model_.symmetry.canonical(candidate.model_from_scan);
+  }
+
+  [[nodiscard]] PoseContrast contrast_of(const Candidate& first, const Candidate& second) const {
+    return contrast(first.model_from_scan, second.model_from_scan, model_, evidence_,
+                    {final_distance_, lateral(final_distance_)});
+  }
+
   // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
   void register_densely(Candidate& candidate) const {
+    make_canonical(candidate);
     constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
     const std::vector<Eigen::Vector3f> around =
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
@@ -159,7 +213,13 @@ class Verification {
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
     }
-    judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+    const PoseEvidence evidence =
+        judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+    const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    candidate.slip_lead = least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter,
+                                                evidence_, options);
+    candidate.overrun_share =
+        rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     candidate.normal_agreement =
         normal_agreement(candidate.model_from_scan, evidence_.foreground, model_, final_distance_,
                          options_.max_normal_angle_deg * std::numbers::pi / 180.0, options_.paper_mode);
@@ -184,15 +244,18 @@ class Verification {
     judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
   }
 
-  void judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
-             double contradiction_weight) const {
-    // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
-    const double lateral = options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
-    take_evidence(
-        candidate,
-        evidence_for(candidate.model_from_scan, samples, model_, evidence_, {distance_mm, lateral, most_samples}),
-        contradiction_weight);
+  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
+                     double contradiction_weight) const {
+    const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_,
+                                               {distance_mm, lateral(distance_mm), most_samples});
+    take_evidence(candidate, evidence, model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
+    return evidence;
+  }
+
+  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
+  [[nodiscard]] double lateral(double distance_mm) const {
+    return options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
   }
 
   const scan::Scan& scan_;
@@ -203,6 +266,8 @@ class Verification {
   ScanEvidence evidence_;
   double final_distance_;
   std::vector<Eigen::Vector3f> shuffled_foreground_;
+  double rim_reach_;
+  std::vector<RimProbe> rim_probes_;
 };
 
 }  // namespace
@@ -214,12 +279,15 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_normal_agreement", min_normal_agreement, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_explained_samples", min_explained_samples, 0, 1000000));
   ASBUILT_CHECK(expect_between("min_margin", min_margin, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("min_contrast", min_contrast, 0.0, 1e6));
+  ASBUILT_CHECK(expect_between("min_contrast_share", min_contrast_share, 0.5, 1.0));
   ASBUILT_CHECK(expect_between("max_free_space_share", max_free_space_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_residual_ratio", max_residual_ratio, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_contradiction_share", max_contradiction_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }
@@ -237,13 +305,16 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidates.push_back(candidate);
   }
   const Verification verification(scan, model, options, context, taken);
-  candidates = verification.coarse_to_fine(std::move(candidates));
+  candidates = verification.with_near_poses(verification.coarse_to_fine(std::move(candidates)));
   parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
     if (!context.cancelled()) verification.register_densely(candidates[i]);
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
 
-  Detection detection = decide(std::move(candidates), model, options);
+  const auto compare = [&](const Candidate& first, const Candidate& second) {
+    return verification.contrast_of(first, second);
+  };
+  Detection detection = decide(std::move(candidates), model, options, compare, !taken.empty());
   if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
     detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
     detection.status = Status::accepted;

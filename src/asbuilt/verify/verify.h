@@ -18,16 +18,19 @@ struct VerifyOptions {
   double deviation_ratio = 0.005;  ///< as-built deviation to be expected / diameter: added to score_distance
   double acceptance_score = 0.7;   ///< Xi over the should-be-visible samples that a detection needs
   double min_normal_agreement =
-      0.75;                        ///< share of the points on the model whose normals must agree (paper: a majority)
-  int min_explained_samples = 60;  ///< model samples that must be confirmed before anything is proved
-  double min_margin = 0.03;        ///< support by which the best pose must beat any different one
+      0.75;                          ///< share of the points on the model whose normals must agree (paper: a majority)
+  int min_explained_samples = 60;    ///< model samples that must be confirmed before anything is proved
+  double min_margin = 0.03;          ///< support by which the best pose must beat any different one
+  double min_contrast = 12.0;        ///< measurements by which it must lead where the two predict different things
+  double min_contrast_share = 0.75;  ///< of these measurements, that must speak for it
   double max_free_space_share = 0.08;     ///< of should-be-visible samples seen through
   double max_residual_ratio = 0.35;       ///< RMS of the points on the model / score distance (0.58: evenly strewn)
   double max_contradiction_share = 0.08;  ///< of should-be-visible samples that the scan denies
   double min_proof = 0.34;                ///< score * normal agreement * (1 - residual ratio / 0.58)
   double hidden_surcharge =
       0.35;  ///< added to min_proof per share of the part that other things hide: what hides can lie
-  double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction
+  double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
+  double max_overrun_share = 0.2;         ///< of the edges past which the scan's surface may go on
   double max_normal_angle_deg = 30.0;     ///< normals closer than this agree
   bool paper_mode = false;
 
@@ -55,6 +58,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("min_normal_agreement", options.min_normal_agreement, "share of the normals that must agree");
   field("min_explained_samples", options.min_explained_samples, "model samples that must be confirmed");
   field("min_margin", options.min_margin, "support by which the best pose must beat any different one");
+  field("min_contrast", options.min_contrast, "measurements that must tell the best pose from a similar one");
+  field("min_contrast_share", options.min_contrast_share, "share of these measurements that must speak for it");
   field("max_free_space_share", options.max_free_space_share,
         "share of the claimed surface the sensor may see through");
   field("max_residual_ratio", options.max_residual_ratio, "RMS of the points on the model / score distance");
@@ -63,14 +68,16 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("min_proof", options.min_proof, "score * normal agreement * fit that a detection needs");
   field("hidden_surcharge", options.hidden_surcharge, "added to min_proof per share of the part that is hidden");
   field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
+  field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
 /// Judges hypotheses, best first: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part out.
 /// A pose that the user vouches for (`--accept`, `--poses`) enters as a hypothesis; `accept_anyway` skips the verdict
-/// for the best of them and says so in the explanation. Points marked in `taken` (one byte a point of the scan, or none
-/// at all) belong to placements of the part that are known already: they confirm nothing, but are cut out with the
-/// rest.
+/// for the best of them and says so in the explanation.
+///
+/// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong to
+/// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the caller.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                                        std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
                                        const Context& context, bool accept_anyway = false,

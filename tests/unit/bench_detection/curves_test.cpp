@@ -28,13 +28,23 @@ std::vector<CaseRecord> records() {
   return all;
 }
 
+double by_score(const CaseRecord& record) { return record.best.score; }
+
+TEST(PrecisionRecall, TrustsWhatWasAcceptedBeforeWhatWasNot) {
+  const Series curve = precision_recall("curve", records(), &CaseRecord::best, verified_trust);
+  EXPECT_THAT(curve.x, ElementsAre(0.25, 0.5, 0.5, 0.5));
+  EXPECT_THAT(curve.y, ElementsAre(1.0, 1.0, 2.0 / 3.0, 0.5));
+}
+
 TEST(PrecisionRecall, CountsWhatAThresholdLetsThrough) {
-  const Series curve = precision_recall("curve", records(), &CaseRecord::best);
+  const Series curve = precision_recall("curve", records(), &CaseRecord::best, by_score);
   EXPECT_THAT(curve.x, ElementsAre(0.25, 0.25, 0.5));
   EXPECT_THAT(curve.y, ElementsAre(1.0, 0.5, 0.5));
 }
 
-TEST(PrecisionRecall, IsEmptyWithoutScans) { EXPECT_TRUE(precision_recall("none", {}, &CaseRecord::best).x.empty()); }
+TEST(PrecisionRecall, IsEmptyWithoutScans) {
+  EXPECT_TRUE(precision_recall("none", {}, &CaseRecord::best, by_score).x.empty());
+}
 
 TEST(RecallOver, SplitsTheScansWithThePartIntoEqualBins) {
   std::vector<CaseRecord> all;
@@ -54,7 +64,7 @@ TEST(Diagrams, NameEveryModeAndAreDrawn) {
   const std::vector<Diagram> diagrams = diagrams_of(records());
   ASSERT_EQ(diagrams.size(), 4U);
   const std::string svg = to_svg(diagrams.front());
-  EXPECT_THAT(svg, HasSubstr("default, by score"));
+  EXPECT_THAT(svg, HasSubstr(">default<"));
   EXPECT_THAT(svg, HasSubstr("</svg>"));
 }
 

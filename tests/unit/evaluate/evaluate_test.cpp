@@ -5,8 +5,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "asbuilt/io/file.h"
+#include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/ply_writer.h"
 #include "scenario.h"
 #include "support/matchers.h"
@@ -45,6 +47,24 @@ TEST(Evaluate, ACommonMotionOfAllPosesCostsNothing) {
   EXPECT_NEAR(*evaluation.ratio_to_oracle, 1.0, 1e-4);
   EXPECT_NEAR(*evaluation.relative_pose_error_sigma, 0.0, 1e-6);
   EXPECT_GT(evaluation.per_scan[scenario.first_present()].error->add_mm, 0.5);
+}
+
+TEST(Evaluate, APoseThatThePartsSymmetryMakesTheSameIsRight) {
+  Scenario scenario("symmetry");
+  // The truth's model made a box, centred on the origin of its frame: four rotations map it onto itself.
+  const auto box = [&](const Eigen::Vector3d& size) {
+    ASSERT_TRUE(io::write_mesh_ply(scenario.folder / "model.ply", simulate::box(size)));
+  };
+  const Pose half_turn(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
+  const Pose quarter_turn(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY()));
+  io::ScanRecord& scan = scenario.record.scans[scenario.first_present()];
+  const Pose truth = *scan.model_from_scan;
+  box({100, 60, 40});
+  scan.model_from_scan = half_turn * truth;
+  EXPECT_EQ(scenario.evaluated().value().right, 3U);
+  EXPECT_LT(scenario.evaluated().value().per_scan[scenario.first_present()].error->max_vertex_mm, 0.5);
+  scan.model_from_scan = quarter_turn * truth;
+  EXPECT_EQ(scenario.evaluated().value().wrong, 1U);
 }
 
 TEST(Evaluate, RelativePoseErrorOfOppositeShiftsIsTheirWeightedSpread) {

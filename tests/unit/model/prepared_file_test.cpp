@@ -74,6 +74,37 @@ TEST_F(PreparedFile, ComesBackAsItWas) {
   EXPECT_TRUE(loaded.rays->first_hit({0, 0, 90}, {0, 0, -1}).found());
 }
 
+TEST_F(PreparedFile, KeepsTheSymmetry) {
+  PreparedModel model = model_;
+  const auto turn = [](double angle) { return rotation_about({0, 0.6, 0.8}, {1, 2, 3}, angle); };
+  model.symmetry.kind = SymmetryGroup::Kind::discrete;
+  model.symmetry.order = 2;
+  model.symmetry.axis = {0, 0.6, 0.8};
+  model.symmetry.centre = {1, 2, 3};
+  model.symmetry.elements = {Pose::Identity(), turn(3.14159265358979)};
+  model.symmetry.near = {{turn(0.5), 0.9, {4, 5, 6}}, {turn(1.5), 0.8, {7, 8, 9}}};
+  model.symmetry.near_axes = {{{1, 0, 0}, {3, 2, 1}, 0.85}};
+  ASSERT_TRUE(save_prepared(folder_ / "symmetric", model));
+  const SymmetryGroup loaded = load_prepared(folder_ / "symmetric", context_).value().symmetry;
+  EXPECT_EQ(loaded.kind, SymmetryGroup::Kind::discrete);
+  EXPECT_EQ(loaded.order, 2);
+  EXPECT_EQ(loaded.axis, model.symmetry.axis);
+  EXPECT_EQ(loaded.centre, model.symmetry.centre);
+  ASSERT_EQ(loaded.elements.size(), 2U);
+  EXPECT_EQ(loaded.elements[1].matrix(), model.symmetry.elements[1].matrix());
+  ASSERT_EQ(loaded.near.size(), 2U);
+  EXPECT_EQ(loaded.near[1].motion.matrix(), model.symmetry.near[1].motion.matrix());
+  EXPECT_EQ(loaded.near[1].share, 0.8);
+  EXPECT_EQ(loaded.near[1].breaks_at, Eigen::Vector3d(7, 8, 9));
+  ASSERT_EQ(loaded.near_axes.size(), 1U);
+  EXPECT_EQ(loaded.near_axes[0].axis, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(loaded.near_axes[0].point, Eigen::Vector3d(3, 2, 1));
+  EXPECT_EQ(loaded.near_axes[0].share, 0.85);
+  model.symmetry.elements[1].linear() *= 2.0;
+  ASSERT_TRUE(save_prepared(folder_ / "stretched", model));
+  EXPECT_FALSE(load_prepared(folder_ / "stretched", context_));
+}
+
 TEST_F(PreparedFile, HasTheSameBytesWhenItIsSavedAgain) {
   ASSERT_TRUE(save_prepared(folder_ / "again", load_prepared(path_, context_).value()));
   EXPECT_EQ(io::read_file(folder_ / "again").value(), content_);
@@ -113,9 +144,9 @@ TEST_F(PreparedFile, IsRefusedWhenAnyByteOfItIsDamaged) {
 
 TEST_F(PreparedFile, OfANewerVersionSaysSo) {
   std::string newer = content_;
-  newer[16] = 2;
+  newer[16] = 3;
   const std::string message = message_for(newer);
-  EXPECT_THAT(message, HasSubstr("version 2"));
+  EXPECT_THAT(message, HasSubstr("version 3"));
   EXPECT_THAT(message, HasSubstr("newer"));
 }
 

@@ -138,6 +138,77 @@ TEST(Verdict, CountsNearlyEqualPosesAsOne) {
   EXPECT_EQ(detection.margin, 0.4);
 }
 
+const model::PreparedModel& square() {
+  static const model::PreparedModel model = test::prepared(test::notched_plate(12.0), 0.05);
+  return model;
+}
+
+// About the z axis through the middle of the model.
+Candidate turned(const Candidate& candidate, double angle, const model::PreparedModel& model) {
+  Candidate other = candidate;
+  other.model_from_scan =
+      model::rotation_about(Eigen::Vector3d::UnitZ(), model.box.center(), angle) * candidate.model_from_scan;
+  return other;
+}
+
+TEST(Verdict, TakesPosesThatTheSymmetryMakesOneForOne) {
+  Candidate other = turned(flawless(), std::numbers::pi / 2, square());
+  other.support = 0.399;
+  const Detection detection = decide({flawless(), other}, square(), {});
+  EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+  EXPECT_EQ(detection.candidates.size(), 1U);
+  EXPECT_THAT(detection.explanation, testing::HasSubstr("4-fold"));
+  EXPECT_LT(displacement_modulo_mm(flawless().model_from_scan, other.model_from_scan, square()), 0.5);
+  EXPECT_GT(displacement_mm(flawless().model_from_scan, other.model_from_scan, square()), 90.0);
+  EXPECT_EQ(decide({flawless(), turned(other, 0.4, square())}, square(), {}).reason, Reason::ambiguous_pose);
+}
+
+TEST(Verdict, BetweenRivalsGoesByWhereTheyDiffer) {
+  const Candidate first = flawless();
+  Candidate second = turned(first, std::numbers::pi, block());
+  second.support = 0.399;
+  PoseContrast seen;
+  const Comparison compare = [&](const Candidate& a, const Candidate&) {
+    const bool in_order = a.support == first.support;
+    return in_order ? seen : PoseContrast{seen.for_second, seen.for_first};
+  };
+  seen = {60.0, 2.0};
+  Detection detection = decide({first, second}, block(), {}, compare);
+  EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+  EXPECT_EQ(detection.best.support, first.support);
+  seen = {2.0, 60.0};
+  detection = decide({first, second}, block(), {}, compare);
+  EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+  EXPECT_EQ(detection.best.support, second.support) << "won where it counts, against a small lead in support";
+  seen = {30.0, 25.0};
+  detection = decide({first, second}, block(), {}, compare);
+  EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
+  seen = {3.0, 0.0};
+  detection = decide({first, second}, block(), {}, compare);
+  EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
+  EXPECT_THAT(detection.explanation, testing::HasSubstr("does not show"));
+}
+
+TEST(Verdict, IsAmbiguousWhereOnlyTheTurnAboutANearAxisIsLoose) {
+  Candidate loose = flawless();
+  loose.weakest_direction = 0.0;
+  EXPECT_EQ(decide({loose}, block(), {}).reason, Reason::under_constrained);
+  loose.weakest_but_near = 0.05;
+  const Detection detection = decide({loose}, block(), {});
+  EXPECT_EQ(detection.status, Status::ambiguous);
+  EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
+  loose.weakest_direction = 0.003;  // of 500 samples, 1.5 hold the turn
+  EXPECT_EQ(decide({loose}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, InPaperModeKnowsNoSymmetry) {
+  VerifyOptions options;
+  options.paper_mode = true;
+  EXPECT_EQ(
+      decide({flawless(), turned(flawless(), std::numbers::pi / 2, square())}, square(), options).candidates.size(),
+      2U);
+}
+
 TEST(Verdict, InPaperModeLooksAtScoreAndNormalsAlone) {
   VerifyOptions options;
   options.paper_mode = true;

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/contrast.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace asbuilt::verify {
+namespace {
+
+constexpr double kGrazing = 0.2;        // as in the evidence: flatter surfaces return too little
+constexpr double kClearlyNearer = 0.5;  // of the distance that counts as on the model
+
+class Contrast {
+ public:
+  Contrast(const model::PreparedModel& model, const ScanEvidence& scan, const EvidenceOptions& options)
+      : model_(model), scan_(scan), options_(options) {
+    // Model samples closer than the measurements are not independent of one another.
+    const double area = surface_area(model.skin) / static_cast<double>(model.dense_samples.size());
+    const double spacing = scan.scan.spacing_mm;
+    weight_ = spacing > 0.0 ? std::min(1.0, area / (spacing * spacing)) : 1.0;
+  }
+
+  // Asks the scan about the samples that `own` puts where `other` has nothing.
+  void add(const Pose& own_from_scan, const Pose& other_from_scan, double& for_own, double& for_other) const {
+    const Pose scan_from_own = own_from_scan.inverse();
+    const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
+    const PointCloud& samples = model_.dense_samples;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double apart = distance_at(other_from_own * samples.positions[i]);
+      if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
+      const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
+      const double cosine = cosine_to_sensor(scan_from_own, point, samples.normals[i], samples.positions[i]);
+      if (cosine < kGrazing) continue;
+      const double verdict = verdict_on(point, cosine, own_from_scan, other_from_scan);
+      (verdict > 0.0 ? for_own : for_other) += std::abs(verdict) * weight_;
+    }
+  }
+
+ private:
+  [[nodiscard]] double distance_at(const Eigen::Vector3f& point_in_model) const {
+    return std::abs(static_cast<double>(model_.field->at(point_in_model).distance));
+  }
+  [[nodiscard]] double distance_at(const Pose& model_from_scan, const Eigen::Vector3f& point_in_scan) const {
+    const Eigen::Vector3d point = model_from_scan * point_in_scan.cast<double>();
+    return distance_at(Eigen::Vector3f(point.cast<float>()));
+  }
+
+  // 0 where the part itself is in the way. Without a viewpoint every sample may be visible.
+  [[nodiscard]] double cosine_to_sensor(const Pose& scan_from_model, const Eigen::Vector3d& point_in_scan,
+                                        const Eigen::Vector3f& normal, const Eigen::Vector3f& point) const {
+    if (!scan_.scan.viewpoint.known()) return 1.0;
+    const Eigen::Vector3d towards =
+        scan_from_model.linear().transpose() * scan_.scan.viewpoint.towards_sensor(point_in_scan);
+    const double cosine = normal.cast<double>().dot(towards);
+    if (cosine < kGrazing) return 0.0;
+    const double lift = 1e-3 * model_.diameter;
+    const Eigen::Vector3d start = point.cast<double>() + lift * normal.cast<double>();
+    return model_.rays->is_blocked(start, towards, lift, 2.0 * model_.diameter) ? 0.0 : cosine;
+  }
+
+  // 1 for the pose that puts a sample here, -1 for the other, 0 if the scan does not tell.
+  [[nodiscard]] double verdict_on(const Eigen::Vector3d& point_in_scan, double cosine, const Pose& own_from_scan,
+                                  const Pose& other_from_scan) const {
+    const double reach = std::hypot(options_.distance_mm, options_.lateral_mm);
+    const KdTree::Neighbour nearest =
+        scan_.foreground_tree.nearest(point_in_scan.cast<float>(), static_cast<float>(reach));
+    if (nearest.found()) {
+      const Eigen::Vector3f& measured = scan_.foreground.cloud.positions[nearest.index];
+      const double own = distance_at(own_from_scan, measured), other = distance_at(other_from_scan, measured);
+      if (std::min(own, other) > options_.distance_mm) return 0.0;  // something else, or a deviation
+      const double lead = other - own;
+      return std::abs(lead) < kClearlyNearer * options_.distance_mm ? 0.0 : std::copysign(1.0, lead);
+    }
+    if (!scan_.depth) return 0.0;
+    using Evidence = scan::DepthImage::Evidence;
+    const double tolerance = (options_.distance_mm + options_.lateral_mm) / cosine;
+    const Evidence seen = scan_.depth->evidence(point_in_scan, tolerance);
+    return seen == Evidence::free || seen == Evidence::near ? -1.0 : 0.0;
+  }
+
+  const model::PreparedModel& model_;
+  const ScanEvidence& scan_;
+  const EvidenceOptions& options_;
+  double weight_ = 1.0;
+};
+
+}  // namespace
+
+PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan, const model::PreparedModel& model,
+                      const ScanEvidence& scan, const EvidenceOptions& options) {
+  const Contrast asked(model, scan, options);
+  PoseContrast result;
+  asked.add(first_from_scan, second_from_scan, result.for_first, result.for_second);
+  asked.add(second_from_scan, first_from_scan, result.for_second, result.for_first);
+  return result;
+}
+
+}  // namespace asbuilt::verify

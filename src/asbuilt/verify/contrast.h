@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "asbuilt/core/pose.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/verify/evidence.h"
+
+namespace asbuilt::verify {
+
+/// What the scan says where two poses of the part predict different things, in measurements that count singly.
+struct PoseContrast {
+  double for_first = 0.0, for_second = 0.0;
+
+  [[nodiscard]] double total() const { return for_first + for_second; }
+};
+
+/// Compares two poses by the samples of the model that only one of them puts where they are: a hole that one claims and
+/// the other does not. Everything that both predict says nothing about which is right, and would drown the rest.
+///
+/// Such a sample speaks for its pose if the nearest scan point lies on the model at this pose and clearly less so at
+/// the other; against it, if the sensor measured something else there. What is hidden or averted is not asked.
+/// Symmetric in the two poses. Cost: two lookups a sample, and a search and a ray for those that differ.
+[[nodiscard]] PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan,
+                                    const model::PreparedModel& model, const ScanEvidence& scan,
+                                    const EvidenceOptions& options);
+
+}  // namespace asbuilt::verify

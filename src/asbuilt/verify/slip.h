@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "asbuilt/core/pose.h"
+#include "asbuilt/model/prepared_model.h"
+#include "asbuilt/verify/evidence.h"
+
+namespace asbuilt::verify {
+
+/// The poses into which a part can slip most easily: both ways along the loosest directions of the surface that was
+/// found (the eigenvectors of PoseEvidence::information with the smallest eigenvalues), each moving the farthest corner
+/// of the model's box by `slip_mm`. Turns that the part's symmetry allows are no slips.
+[[nodiscard]] std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                              const model::PreparedModel& model, double slip_mm);
+
+/// By how many measurements a pose leads over the slipped pose that comes closest to it (see contrast()). Sees what
+/// eigenvalues do not: that the sensor looked past the edge at which the part ends. Negative if a slip would be better.
+[[nodiscard]] double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                           const model::PreparedModel& model, double slip_mm, const ScanEvidence& scan,
+                                           const EvidenceOptions& options);
+
+}  // namespace asbuilt::verify

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/contrast.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "unit/verify/seen.h"
+
+namespace asbuilt::verify {
+namespace {
+
+// A plate that one deeper notch keeps from being four-fold.
+const model::PreparedModel& plate() {
+  static const model::PreparedModel model = test::prepared(test::notched_plate(26.0), 0.04);
+  return model;
+}
+
+const Pose kScanFromModel = Pose(Eigen::Translation3d(0, 0, 600));
+
+Pose quarter_turned() {
+  return Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()) * kScanFromModel.inverse();
+}
+
+PoseContrast asked(const scan::Scan& scan, const Pose& first, const Pose& second) {
+  const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+  return contrast(first, second, plate(), evidence, {0.7, std::max(0.7, 2.5 * scan.spacing_mm)});
+}
+
+TriangleMesh part() { return simulate::transformed(test::notched_plate(26.0), kScanFromModel); }
+TriangleMesh wall() { return test::plate_at({2000, 2000, 10}, {0, 0, 1000}); }
+
+// Two places of 14 x 24 mm, where one pose has the deep notch and the other has not.
+TEST(Contrast, SpeaksForTheTruePoseWhereTheOtherPutsItsNotch) {
+  const scan::Scan scan = test::seen({part(), wall()});
+  const PoseContrast result = asked(scan, kScanFromModel.inverse(), quarter_turned());
+  EXPECT_GT(result.for_first, 20.0);
+  EXPECT_LT(result.for_second, 0.05 * result.for_first);
+}
+
+TEST(Contrast, DoesNotDependOnTheOrder) {
+  const scan::Scan scan = test::seen({part(), wall()});
+  const PoseContrast there = asked(scan, kScanFromModel.inverse(), quarter_turned());
+  const PoseContrast back = asked(scan, quarter_turned(), kScanFromModel.inverse());
+  EXPECT_EQ(there.for_first, back.for_second);
+  EXPECT_EQ(there.for_second, back.for_first);
+}
+
+TEST(Contrast, OfAPoseWithItselfIsNothing) {
+  const scan::Scan scan = test::seen({part(), wall()});
+  EXPECT_EQ(asked(scan, kScanFromModel.inverse(), kScanFromModel.inverse()).total(), 0.0);
+}
+
+TEST(Contrast, IsNothingWhereBothPlacesAreHidden) {
+  // Seen from the sensor, x > 15 and y > 15 (of the part's 50) lie behind a plate each.
+  const TriangleMesh right = test::plate_at({400, 800, 2}, {200 + 15 * 400.0 / 600.0, 0, 400});
+  const TriangleMesh above = test::plate_at({800, 400, 2}, {0, 200 + 15 * 400.0 / 600.0, 410});
+  const TriangleMesh left = test::plate_at({400, 800, 2}, {-200 - 15 * 400.0 / 600.0, 0, 420});
+  const TriangleMesh below = test::plate_at({800, 400, 2}, {0, -200 - 15 * 400.0 / 600.0, 430});
+  const scan::Scan scan = test::seen({part(), right, above, left, below, wall()});
+  EXPECT_LT(asked(scan, kScanFromModel.inverse(), quarter_turned()).total(), 1.0);
+}
+
+}  // namespace
+}  // namespace asbuilt::verify
