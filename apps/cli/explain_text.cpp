@@ -107,9 +107,13 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
                       best.residual_ratio, limit(record, "max_residual_ratio", "allowed:", 1.0, 2, ""));
   text += fmt::format(
       "  Hold: {:.4f}{} in the direction in which the surface that was found lets the part slide or turn most easily; "
-      "0 "
-      "would be free.\n",
+      "0 would be free",
       best.weakest_direction, limit(record, "min_weakest_direction", "needed:", 1.0, 4, ""));
+  if (std::isnan(best.slip_lead)) return text + ".\n";
+  text += fmt::format("; or by its edges: {:.0f} measurements more than for the slip that comes closest{}.\n",
+                      best.slip_lead, limit(record, "min_contrast", "needed:", 1.0, 0, ""));
+  text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
+                      percent_allowed(record, "max_overrun_share"));
   return text;
 }
 

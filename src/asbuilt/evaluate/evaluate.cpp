@@ -210,8 +210,7 @@ std::vector<Line> paired(const std::vector<std::size_t>& entries, const io::RunR
   return lines;
 }
 
-ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRecord& record,
-                       Part& part) {
+ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRecord& record, Part& part) {
   ScanFigures figures;
   figures.name = truth.path.filename().string();
   figures.present = line.placement.has_value();

@@ -75,6 +75,8 @@ Json json_of(const CandidateRecord& candidate) {
           {"missing_share", json_number(candidate.missing_share)},
           {"residual_ratio", json_number(candidate.residual_ratio)},
           {"weakest_direction", json_number(candidate.weakest_direction)},
+          {"slip_lead", json_number(candidate.slip_lead)},
+          {"overrun_share", json_number(candidate.overrun_share)},
           {"objection", candidate.objection}};
 }
 
@@ -218,6 +220,8 @@ CandidateRecord candidate_of(const Json& json) {
   candidate.missing_share = later_number_at(json, "missing_share");
   candidate.residual_ratio = later_number_at(json, "residual_ratio");
   candidate.weakest_direction = later_number_at(json, "weakest_direction");
+  candidate.slip_lead = later_number_at(json, "slip_lead");
+  candidate.overrun_share = later_number_at(json, "overrun_share");
   candidate.objection = json.value("objection", "");
   return candidate;
 }

@@ -48,6 +48,8 @@ struct CandidateRecord {
   double facing_share = kNotTold, found_share = kNotTold, contradiction_share = kNotTold, missing_share = kNotTold;
   double residual_ratio = kNotTold;     ///< rms / distance that counts as on the model
   double weakest_direction = kNotTold;  ///< how firmly the surface that was found holds the pose
+  double slip_lead = kNotTold;          ///< measurements by which the pose leads over the small slip that comes closest
+  double overrun_share = kNotTold;      ///< of the part's edges, those past which the scan's surface goes on
   std::string objection;                ///< reason code of what stands against it on its own; empty: nothing
 
   static constexpr double kNotTold = std::numeric_limits<double>::quiet_NaN();

@@ -72,6 +72,8 @@ io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Ve
   record.missing_share = candidate.missing_share;
   record.residual_ratio = candidate.residual_ratio;
   record.weakest_direction = candidate.weakest_direction;
+  record.slip_lead = candidate.slip_lead;
+  record.overrun_share = candidate.overrun_share;
   record.objection = verify::code_of(candidate.objection);
   return record;
 }

@@ -69,10 +69,11 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
   }
   if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
-    return {Reason::contradicted,
-            fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
-                        "to something larger",
-                        100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
+    return {
+        Reason::contradicted,
+        fmt::format("the surface goes on past {:.0f} % of the part's edges, at most {:.0f} % are allowed: it belongs "
+                    "to something larger",
+                    100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
   }
   if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,

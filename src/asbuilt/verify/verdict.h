@@ -48,6 +48,7 @@ using Comparison = std::function<PoseContrast(const Candidate& first, const Cand
 /// same place are told apart by `compare`, if it is there, else by their support alone. Rivals elsewhere make the pose
 /// ambiguous, unless it is to be `one_of_several`: then whether they are placements of their own is for the caller.
 [[nodiscard]] Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model,
-                               const VerifyOptions& options, const Comparison& compare = {}, bool one_of_several = false);
+                               const VerifyOptions& options, const Comparison& compare = {},
+                               bool one_of_several = false);
 
 }  // namespace asbuilt::verify

@@ -216,8 +216,8 @@ class Verification {
     const PoseEvidence evidence =
         judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
-    candidate.slip_lead = least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter,
-                                                evidence_, options);
+    candidate.slip_lead =
+        least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter, evidence_, options);
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     candidate.normal_agreement =

@@ -77,7 +77,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
 /// for the best of them and says so in the explanation.
 ///
 /// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong to
-/// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the caller.
+/// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the
+/// caller.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                                        std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
                                        const Context& context, bool accept_anyway = false,

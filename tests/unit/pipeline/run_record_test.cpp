@@ -39,7 +39,8 @@ RunRecord example() {
   scan.candidates.push_back({});
   scan.candidates[1].facing_share = 0.3, scan.candidates[1].found_share = 0.25, scan.candidates[1].missing_share = 0.5;
   scan.candidates[1].contradiction_share = 0.25, scan.candidates[1].residual_ratio = 0.2;
-  scan.candidates[1].weakest_direction = 0.01, scan.candidates[1].objection = "low_score";
+  scan.candidates[1].weakest_direction = 0.01, scan.candidates[1].slip_lead = -3.5;
+  scan.candidates[1].overrun_share = 0.125, scan.candidates[1].objection = "low_score";
   scan.instance = 2, scan.instances_in_scan = 3;
   scan.segment_points = 5;
   scan.warnings = {"one"};
@@ -62,8 +63,9 @@ TEST(RunRecord, ComesBackExactlyAsItWasWritten) {
 
 TEST(RunRecord, OfAnEarlierVersionIsReadWithoutTheFieldsThatCameLater) {
   std::string text = to_json(example());
-  for (const char* later : {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share",
-                            "missing_share", "residual_ratio", "weakest_direction", "objection"}) {
+  for (const char* later :
+       {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share", "missing_share",
+        "residual_ratio", "weakest_direction", "slip_lead", "overrun_share", "objection"}) {
     const std::string key = std::string("\"") + later + "\":";
     for (auto at = text.find(key); at != std::string::npos; at = text.find(key)) text.replace(at, key.size(), "\"x\":");
   }
@@ -72,6 +74,8 @@ TEST(RunRecord, OfAnEarlierVersionIsReadWithoutTheFieldsThatCameLater) {
   EXPECT_EQ(back->scans[0].instance, 1);
   EXPECT_EQ(back->scans[0].instances_in_scan, 1);
   EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].found_share));
+  EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].slip_lead));
+  EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].overrun_share));
   EXPECT_EQ(back->scans[0].candidates[1].objection, "");
 }
 
