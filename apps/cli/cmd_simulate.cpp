@@ -45,9 +45,12 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   ASBUILT_CHECK(simulate::write_simulation(arguments.output, *simulation));
   ASBUILT_CHECK(folder.finish());
   for (const auto& scan : simulation->scans) {
+    const std::string part = !scan.model_from_scan ? "no part"
+                             : scan.other_placements.empty()
+                                 ? "the part is there"
+                                 : fmt::format("the part is there in {} places", scan.other_placements.size() + 1);
     shell.print_result(fmt::format("{}: {} points, {}, clutter {:.2f}, hidden {:.2f}\n", scan.name,
-                                   scan.points_in_scan.size(), scan.model_from_scan ? "the part is there" : "no part",
-                                   scan.clutter, scan.hidden));
+                                   scan.points_in_scan.size(), part, scan.clutter, scan.hidden));
   }
   const auto truth = std::filesystem::path(arguments.output) / "truth.json";
   ASBUILT_TRY(json, io::read_file(truth));

@@ -32,6 +32,16 @@ void add_scan_options(CLI::App& command, pipeline::Options& options) {
                   "Where the sensor stood, in the scan's coordinates: auto, none, x,y,z, dir:dx,dy,dz, or a CSV file "
                   "with rows SCAN,x,y,z")
       ->capture_default_str();
+  command
+      .add_option_function<std::string>(
+          "--instances",
+          [&options](const std::string& name) {
+            options.instances = name == "all" ? pipeline::Instances::all : pipeline::Instances::one;
+          },
+          "Placements of the part in one scan: one (a second makes the scan ambiguous) or all (each is a detection of "
+          "its own)")
+      ->check(CLI::IsMember({"one", "all"}))
+      ->default_str("one");
   command.add_option("--poses", options.poses, "Poses to start from: CSV rows SCAN,a11,...,a44, or JSON")
       ->group(kHelpGroup);
 }

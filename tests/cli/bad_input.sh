@@ -45,6 +45,8 @@ says warning missing.ply cut.ply
 awk 'BEGIN { for (i = 0; i < 100; ++i) for (j = 0; j < 100; ++j) print i * 5, j * 5, 800 }' >plane.xyz
 expect 1 detect "$model" plane.xyz -o plane
 [ "$(status_of plane plane)" = rejected ] || fail "a plane was not rejected"
+expect 0 explain plane
+grep -q "plane .* is rejected \[$(field_of plane plane reason_code)\]" stdout || fail "explain does not say why"
 
 # ---- a unit that is wrong by 1000 is named
 expect 1 detect "$model" "$good" -o metres --unit m

@@ -31,8 +31,10 @@ says() {
 
 same() { cmp -s "$1" "$2" || fail "$1 and $2 differ"; }
 absent() { [ ! -e "$1" ] || fail "$1 was left behind"; }
-status_of() { grep -A12 "\"name\": \"$2\"" "$1/result.json" | grep '"status"' | head -n 1 | cut -d'"' -f4; }
-field_of() { grep -A24 "\"name\": \"$2\"" "$1/result.json" | grep "\"$3\":" | head -n 1 | cut -d'"' -f4; }
+status_of() { grep -A14 "\"name\": \"$2\"" "$1/result.json" | grep '"status"' | head -n 1 | cut -d'"' -f4; }
+field_of() { grep -A26 "\"name\": \"$2\"" "$1/result.json" | grep "\"$3\":" | head -n 1 | cut -d'"' -f4; }
+# count_of FIELD: the number under a field of the JSON in stdout, the first of its name.
+count_of() { grep "\"$1\":" stdout | head -n 1 | tr -dc '0-9'; }
 
 # A small scene with the demonstration part: three scans that overlap.
 small_scene() {

@@ -7,20 +7,26 @@ scans="scene/scan_00.ply scene/scan_01.ply scene/scan_02.ply"
 # ---- the same bytes whatever the thread count
 for threads in 1 2 3; do
   # shellcheck disable=SC2086
-  expect 0 reconstruct "$model" $scans -o "r$threads" --threads $threads --json
+  expect 0 reconstruct "$model" $scans -o "r$threads" --threads $threads --mesh --json
   cp stdout "stdout$threads"
   same "stdout$threads" "r$threads/result.json"
 done
-for file in result.json reconstruction.ply report.json; do
+for file in result.json reconstruction.ply mesh.ply report.json; do
   same "r1/$file" "r2/$file"
   same "r1/$file" "r3/$file"
 done
 
+# ---- the mesh is one that other programs can read, about as large as the part
+expect 0 info r1/mesh.ply --json
+grep -q '"kind": "mesh"' stdout || fail "mesh.ply is no mesh"
+[ "$(count_of triangles)" -gt 1000 ] || fail "mesh.ply has $(count_of triangles) triangles"
+expect 0 inspect "$model" r1/mesh.ply -o mesh_report --tolerance -5,5
+
 # ---- detect, then register: the same as reconstruct
 # shellcheck disable=SC2086
 expect 0 detect "$model" $scans -o detected
-expect 0 register detected -o registered
-for file in result.json reconstruction.ply report.json; do same "r1/$file" "registered/$file"; done
+expect 0 register detected -o registered --mesh
+for file in result.json reconstruction.ply mesh.ply report.json; do same "r1/$file" "registered/$file"; done
 for file in r1/segments/*; do same "$file" "registered/segments/$(basename "$file")"; done
 
 # ---- spread over runs, the scans come together again
@@ -47,6 +53,12 @@ expect 0 inspect "$model" r1/reconstruction.ply -o report --tolerance -5,5 --jso
 same stdout report/report.json
 grep -q '"verdict": "pass"' report/report.json || fail "the verdict is not pass"
 
+# ---- a graph in pieces: 5, also when it is out of tolerance; each piece is told
+expect 5 register detected -o pieces --graph-low 1 --graph-high 1 --tolerance -0.0001,0.0001
+says disconnected overlap
+[ "$(grep -c '"status": "disconnected"' pieces/result.json)" -eq 2 ] || fail "two scans should hang loose"
+absent pieces/mesh.ply
+
 # ---- the user's own choices are carried out and written down
 "$asbuilt" register detected -o without --exclude scan_01 >/dev/null 2>stderr
 [ "$(field_of without scan_01 reason_code)" = excluded ] || fail "--exclude was not carried out"
@@ -59,6 +71,11 @@ expect 0 detect "$model" scene/scan_00.ply -o vouched --accept scan_00:0
 # ---- words and figures
 expect 0 explain r1
 grep -q 'scan_00 .* is accepted' stdout || fail "explain does not say what became of a scan"
+for words in 'Should be visible: [0-9]' 'was found where the model has it' 'is denied (allowed: 8 %)' 'was seen through' \
+  'nothing came back' 'Normals: [0-9]* % .*(needed: 75 %)' 'Scatter: .* mm (RMS)' \
+  'past [0-9]* % of the part.s edges the surface goes on (allowed: 20 %)' 'Runner-up: ' 'is linked to scan_0'; do
+  grep -q "$words" stdout || fail "explain does not say '$words'"
+done
 expect 0 explain r1 scan_01
 grep -q scan_00 stdout && grep -q '^scan_00' stdout && fail "explain speaks of a scan nobody asked for"
 expect 2 explain r1 nobody

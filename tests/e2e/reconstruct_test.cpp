@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
+#include <map>
+#include <set>
 
 #include "asbuilt/evaluate/evaluate.h"
 #include "asbuilt/io/file.h"
+#include "asbuilt/io/ply_writer.h"
 #include "asbuilt/pipeline.h"
 #include "asbuilt/simulate/simulate.h"
 #include "support/parts.h"
@@ -70,6 +74,50 @@ TEST_F(Reconstruct, AcceptsNothingWhereThePartIsAbsent) {
   }
   EXPECT_EQ(record->state, io::RunState::failed);
   EXPECT_FALSE(fs::exists(result() / "reconstruction.ply"));
+}
+
+TEST_F(Reconstruct, ASecondPlacementInAScanIsAmbiguousUnlessAllAreWanted) {
+  simulate_scenes({.scans = 3, .seed = 14, .clutter_objects = 3, .hidden_high = 0.15, .instances = 2, .as_built = {}});
+  const auto one = reconstruct();
+  ASSERT_TRUE(one.has_value()) << one.error().message;
+  ASSERT_EQ(one->scans.size(), 3U);
+  for (const io::ScanRecord& scan : one->scans) {
+    EXPECT_EQ(scan.status, io::ScanStatus::ambiguous) << scan.name << ": " << scan.reason;
+    EXPECT_EQ(scan.reason_code, "second_instance") << scan.name << ": " << scan.reason;
+  }
+  EXPECT_EQ(evaluated().present, 3U);
+
+  fs::remove_all(result());
+  pipeline::Options options;
+  options.instances = pipeline::Instances::all;
+  const auto all = reconstruct(options);
+  ASSERT_TRUE(all.has_value()) << all.error().message;
+  const evaluate::Evaluation figures = evaluated();
+  EXPECT_EQ(figures.scans, 3U);
+  EXPECT_EQ(figures.present, 6U);
+  EXPECT_EQ(figures.right + figures.disconnected_right, 6U) << evaluate::to_table(figures);
+  EXPECT_EQ(figures.wrong, 0U) << evaluate::to_table(figures);
+  for (const evaluate::ScanFigures& scan : figures.per_scan) {
+    EXPECT_GE(scan.segment_recall.value(), 0.95) << scan.name;
+    EXPECT_GE(scan.segment_precision.value(), 0.98) << scan.name;
+  }
+
+  // No point of a scan belongs to two placements, and the names tell them apart.
+  std::map<std::string, std::set<std::array<double, 3>>> points_of_file;
+  std::map<std::string, std::size_t> claims;
+  for (std::size_t i = 0; i < all->scans.size(); ++i) {
+    const io::ScanRecord& scan = all->scans[i];
+    EXPECT_EQ(scan.instances_in_scan, 2) << scan.name;
+    EXPECT_EQ(scan.name.ends_with("#2"), scan.instance == 2) << scan.name;
+    const auto vertices = io::read_ply_vertices(result() / io::segment_file(i, scan.name)).value();
+    const auto &x = *vertices.find("x"), &y = *vertices.find("y"), &z = *vertices.find("z");
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      if ((*vertices.find("part"))[k] == 0.0) continue;
+      points_of_file[scan.path].insert({x[k], y[k], z[k]});
+      ++claims[scan.path];
+    }
+  }
+  for (const auto& [path, count] : claims) EXPECT_EQ(points_of_file[path].size(), count) << path;
 }
 
 TEST_F(Reconstruct, StopsWhenAskedAndGoesOnToTheSameBytes) {

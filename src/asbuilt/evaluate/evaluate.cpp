@@ -17,19 +17,27 @@
 namespace asbuilt::evaluate {
 namespace {
 
-constexpr std::uint8_t kPart = 1;  // label of the part's points
+using EntriesByName = std::map<std::string, std::vector<std::size_t>>;
 
-using RecordByName = std::map<std::string, std::size_t>;
-
-// Scans of the record by file name. Two of one name could not be told apart.
-Result<RecordByName> scans_by_file_name(const io::RunRecord& record) {
-  RecordByName by_name;
+// Entries of the record by file name: the placements found in that scan. Two files of one name could not be told apart.
+Result<EntriesByName> entries_by_file_name(const io::RunRecord& record) {
+  EntriesByName by_name;
   for (std::size_t i = 0; i < record.scans.size(); ++i) {
     const std::string name = std::filesystem::path(record.scans[i].path).filename().string();
-    if (by_name.try_emplace(name, i).second) continue;
-    return fail(ErrorCode::not_possible, fmt::format("the result holds two scans from files named {}", name));
+    std::vector<std::size_t>& entries = by_name[name];
+    const bool is_further = !entries.empty() && record.scans[i].instance > record.scans[entries.back()].instance;
+    if (!entries.empty() && !is_further) {
+      return fail(ErrorCode::not_possible, fmt::format("the result holds two scans from files named {}", name));
+    }
+    entries.push_back(i);
   }
   return by_name;
+}
+
+bool looked_for_all_placements(const io::RunRecord& record) {
+  return std::ranges::any_of(record.options, [](const auto& option) {
+    return option.first == "instances" && option.second == io::OptionValue(std::string("all"));
+  });
 }
 
 // How well the part's points were found in a scan.
@@ -37,7 +45,8 @@ struct SegmentFigures {
   double precision = 0.0, recall = 0.0;
 };
 
-Result<SegmentFigures> segment_figures(const std::filesystem::path& file, const LabelledPoints& truth) {
+Result<SegmentFigures> segment_figures(const std::filesystem::path& file, const LabelledPoints& truth,
+                                       std::uint8_t label) {
   ASBUILT_TRY(vertices, io::read_ply_vertices(file));
   const auto *x = vertices.find("x"), *y = vertices.find("y"), *z = vertices.find("z"), *part = vertices.find("part");
   if (x == nullptr || y == nullptr || z == nullptr) {
@@ -56,11 +65,11 @@ Result<SegmentFigures> segment_figures(const std::filesystem::path& file, const 
     const Eigen::Vector3f point = Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]).cast<float>();
     // The same point, but for what an offset taken off and put back may cost.
     const auto nearest = tree.nearest(point, 1e-3F + 1e-6F * point.norm());
-    if (!nearest.found() || truth.labels[nearest.index] != kPart) continue;
+    if (!nearest.found() || truth.labels[nearest.index] != label) continue;
     ++correct;
     found[nearest.index] = true;
   }
-  const auto all = std::ranges::count(truth.labels, kPart), hits = std::ranges::count(found, true);
+  const auto all = std::ranges::count(truth.labels, label), hits = std::ranges::count(found, true);
   return SegmentFigures{claimed == 0 ? 0.0 : static_cast<double>(correct) / static_cast<double>(claimed),
                         all == 0 ? 0.0 : static_cast<double>(hits) / static_cast<double>(all)};
 }
@@ -70,11 +79,11 @@ struct PartPoints {
   std::vector<Eigen::Vector3d> ours, truth;
 };
 
-void append(PartPoints& points, const LabelledPoints& scan, const Pose& ours, const Pose& truth) {
+void append(PartPoints& points, const LabelledPoints& scan, const Pose& ours, const TruePlacement& truth) {
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    if (scan.labels[i] != kPart || !scan.points_in_scan[i].allFinite()) continue;
+    if (scan.labels[i] != truth.label || !scan.points_in_scan[i].allFinite()) continue;
     points.ours.push_back(ours * scan.points_in_scan[i]);
-    points.truth.push_back(truth * scan.points_in_scan[i]);
+    points.truth.push_back(truth.model_from_scan * scan.points_in_scan[i]);
   }
 }
 
@@ -154,18 +163,66 @@ class Part {
   std::optional<model::SymmetryGroup> group_;
 };
 
-ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, Part& part) {
+// A line of the evaluation: what the result says (if anything) of a place where the part stands (if it does).
+struct Line {
+  std::optional<std::size_t> entry;  // of the record
+  std::optional<TruePlacement> placement;
+};
+
+// Pairs the entries of a scan with its true placements, the least displaced first; each is used once. Entries without
+// a pose stand for the placements that are left. Of these further ones count only if they were looked for.
+std::vector<Line> paired(const std::vector<std::size_t>& entries, const io::RunRecord& record,
+                         const std::vector<TruePlacement>& placements, bool all_placements, Part& part) {
+  struct Pair {
+    double displacement_mm;
+    std::size_t line, placement;
+  };
+  std::vector<Line> lines;
+  std::vector<Pair> pairs;
+  for (const std::size_t entry : entries) {
+    if (const auto& pose = record.scans[entry].model_from_scan) {
+      for (std::size_t p = 0; p < placements.size(); ++p) {
+        const PoseError error = part.error(*pose, placements[p].model_from_scan);
+        pairs.push_back({error.max_vertex_mm, lines.size(), p});
+      }
+    }
+    lines.push_back({entry, std::nullopt});
+  }
+  std::ranges::stable_sort(pairs, std::ranges::less{}, &Pair::displacement_mm);
+  std::vector<bool> used(placements.size(), false);
+  for (const Pair& pair : pairs) {
+    if (lines[pair.line].placement || used[pair.placement]) continue;
+    lines[pair.line].placement = placements[pair.placement];
+    used[pair.placement] = true;
+  }
+  for (std::size_t p = 0; p < placements.size(); ++p) {
+    if (used[p]) continue;
+    const auto waiting = std::ranges::find_if(lines, [&](const Line& line) {
+      return line.entry && !line.placement && !record.scans[*line.entry].model_from_scan;
+    });
+    if (waiting != lines.end()) {
+      waiting->placement = placements[p];
+    } else if (all_placements || lines.empty()) {
+      lines.push_back({std::nullopt, placements[p]});
+    }
+  }
+  if (lines.empty()) lines.emplace_back();
+  return lines;
+}
+
+ScanFigures figures_of(const TrueScan& truth, const Line& line, const io::RunRecord& record, Part& part) {
   ScanFigures figures;
   figures.name = truth.path.filename().string();
-  figures.present = truth.model_from_scan.has_value();
-  figures.occlusion = truth.occlusion;
-  figures.hidden = truth.hidden;
+  figures.present = line.placement.has_value();
+  figures.occlusion = line.placement ? line.placement->occlusion : truth.occlusion;
+  figures.hidden = line.placement ? line.placement->hidden : truth.hidden;
   figures.clutter = truth.clutter;
-  if (record == nullptr) return figures;
-  figures.status = io::name_of(record->status);
-  figures.accepted = record->status == io::ScanStatus::accepted && record->model_from_scan.has_value();
-  if (figures.present && record->model_from_scan) {
-    figures.error = part.error(*record->model_from_scan, *truth.model_from_scan);
+  if (!line.entry) return figures;
+  const io::ScanRecord& scan = record.scans[*line.entry];
+  figures.status = io::name_of(scan.status);
+  figures.accepted = scan.status == io::ScanStatus::accepted && scan.model_from_scan.has_value();
+  if (figures.present && scan.model_from_scan) {
+    figures.error = part.error(*scan.model_from_scan, line.placement->model_from_scan);
   }
   figures.right = figures.accepted && figures.error && part.is_right(*figures.error);
   return figures;
@@ -173,7 +230,6 @@ ScanFigures figures_of(const TrueScan& truth, const io::ScanRecord* record, Part
 
 void count(Evaluation& evaluation, double tolerance_mm) {
   for (const ScanFigures& scan : evaluation.per_scan) {
-    ++evaluation.scans;
     evaluation.present += scan.present;
     evaluation.accepted += scan.accepted;
     evaluation.right += scan.right;
@@ -199,36 +255,45 @@ Result<void> EvaluateOptions::validate() const {
 Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, const std::filesystem::path& result_folder,
                             const EvaluateOptions& options, const Context& context) {
   ASBUILT_CHECK(options.validate());
-  ASBUILT_TRY(by_name, scans_by_file_name(record));
+  ASBUILT_TRY(by_name, entries_by_file_name(record));
   ASBUILT_TRY(model, io::read_mesh(truth.folder / truth.model, io::Unit::millimetre));
   ASBUILT_TRY(as_built, io::read_mesh(truth.folder / truth.as_built, io::Unit::millimetre));
 
   Evaluation evaluation;
   evaluation.diameter_mm = diameter(model);
   evaluation.noise_sigma_mm = truth.noise_sigma_mm;
+  evaluation.scans = truth.scans.size();
   const double tolerance_mm = options.right_ratio * evaluation.diameter_mm;
+  const bool all_placements = looked_for_all_placements(record);
   Part part(model, truth.symmetries, tolerance_mm, context);
   PartPoints points;
-  std::size_t known = 0;
+  std::size_t known = 0, done = 0;
   for (const TrueScan& scan : truth.scans) {
     if (context.cancelled()) return fail(ErrorCode::cancelled, "the evaluation was cancelled");
-    const auto found = by_name.find(scan.path.filename().string());
-    const io::ScanRecord* ours = found == by_name.end() ? nullptr : &record.scans[found->second];
-    known += ours != nullptr;
-    ScanFigures figures = figures_of(scan, ours, part);
-    if (ours != nullptr && figures.present && ours->model_from_scan && !scan.labels.empty()) {
-      ASBUILT_TRY(labelled, read_labelled_points(truth, scan));
-      if (figures.accepted) append(points, labelled, *ours->model_from_scan, *scan.model_from_scan);
-      const std::filesystem::path segment = result_folder / io::segment_file(found->second, ours->name);
-      if (std::error_code ignored; ours->has_segment() && std::filesystem::exists(segment, ignored)) {
-        ASBUILT_TRY(segmentation, segment_figures(segment, labelled));
-        figures.segment_precision = segmentation.precision;
-        figures.segment_recall = segmentation.recall;
+    const std::vector<std::size_t>& entries = by_name[scan.path.filename().string()];
+    known += !entries.empty();
+    const auto lines = paired(entries, record, scan.placements(), all_placements, part);
+    std::optional<LabelledPoints> labelled;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      ScanFigures figures = figures_of(scan, lines[i], record, part);
+      if (i > 0) figures.name += fmt::format("#{}", i + 1);
+      if (figures.error && !scan.labels.empty()) {
+        if (!labelled) {
+          ASBUILT_TRY(read, read_labelled_points(truth, scan));
+          labelled = std::move(read);
+        }
+        const io::ScanRecord& ours = record.scans[*lines[i].entry];
+        if (figures.accepted) append(points, *labelled, *ours.model_from_scan, *lines[i].placement);
+        const std::filesystem::path segment = result_folder / io::segment_file(*lines[i].entry, ours.name);
+        if (std::error_code ignored; ours.has_segment() && std::filesystem::exists(segment, ignored)) {
+          ASBUILT_TRY(segmentation, segment_figures(segment, *labelled, lines[i].placement->label));
+          figures.segment_precision = segmentation.precision;
+          figures.segment_recall = segmentation.recall;
+        }
       }
+      evaluation.per_scan.push_back(std::move(figures));
     }
-    evaluation.per_scan.push_back(std::move(figures));
-    context.report_progress(0.7 * static_cast<double>(evaluation.per_scan.size()) /
-                            static_cast<double>(truth.scans.size()));
+    context.report_progress(0.7 * static_cast<double>(++done) / static_cast<double>(truth.scans.size()));
   }
   if (known == 0 && !truth.scans.empty()) {
     return fail(ErrorCode::not_possible,

@@ -26,9 +26,10 @@ void for_each_field(EvaluateOptions& options, Visitor&& field) {
   field("right_ratio", options.right_ratio, "largest vertex displacement / diameter of a right pose");
 }
 
-/// One scan of the truth and what the result says about it.
+/// One scan of the truth and what the result says about it; where the result tells of several placements of the part
+/// in the scan (`--instances all`), one of them.
 struct ScanFigures {
-  std::string name;                ///< file name
+  std::string name;                ///< file name; "#2", "#3" ... are added for further placements
   std::string status = "missing";  ///< that of result.json, or "missing" if the result does not know the scan
   bool present = false;            ///< the part is there
   bool accepted = false;
@@ -41,7 +42,8 @@ struct ScanFigures {
 /// The figures of a run.
 struct Evaluation {
   double diameter_mm = 0.0, noise_sigma_mm = 0.0;
-  std::size_t scans = 0, present = 0, accepted = 0, right = 0, wrong = 0, disconnected_right = 0;
+  std::size_t scans = 0;  ///< of the truth
+  std::size_t present = 0, accepted = 0, right = 0, wrong = 0, disconnected_right = 0;
   std::optional<double> recall;            ///< right / present
   std::optional<double> precision;         ///< right / accepted
   std::size_t part_points = 0;             ///< truly labelled part points of the accepted scans
@@ -54,8 +56,9 @@ struct Evaluation {
 };
 
 /// Compares the result.json of `result_folder` with the truth (truth.json or its folder). Scans are matched by file
-/// name. Definitions: docs/evaluate.md. Cost: a few seconds for ten scans.
-/// Errors: unreadable_input; not_possible when no scan of the result is in the truth, or two have the same file name.
+/// name, several placements in one scan by the smallest displacement, each at most once. Definitions: docs/evaluate.md.
+/// Cost: a few seconds for ten scans. Errors: unreadable_input; not_possible when no scan of the result is in the
+/// truth, or two have the same file name.
 [[nodiscard]] Result<Evaluation> evaluate(const std::filesystem::path& truth_path,
                                           const std::filesystem::path& result_folder, const EvaluateOptions& options,
                                           const Context& context);

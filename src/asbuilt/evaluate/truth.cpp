@@ -52,6 +52,17 @@ Pose pose_of(const Json& rows, const std::string& where) {
   return orthonormalised(Pose(matrix));
 }
 
+TruePlacement other_placement_of(const Json& json, const std::string& scan) {
+  const std::string where = "a further placement of " + scan;
+  if (!json.is_object()) throw WrongField{where + " is not an object"};
+  const Json& label = field(json, "label", where);
+  if (!label.is_number_integer() || label < 2 || label > 254) {
+    throw WrongField{fmt::format("'label' of {} is {}, expected 2 to 254", where, label.dump())};
+  }
+  return {pose_of(field(json, "model_from_scan", where), "'model_from_scan' of " + where), label.get<std::uint8_t>(),
+          number_or_zero(json, "occlusion"), number_or_zero(json, "hidden")};
+}
+
 TrueScan scan_of(const Json& json, std::size_t index) {
   const std::string where = fmt::format("scan {}", index);
   if (!json.is_object()) throw WrongField{where + " is not an object"};
@@ -63,6 +74,9 @@ TrueScan scan_of(const Json& json, std::size_t index) {
   scan.occlusion = number_or_zero(json, "occlusion");
   scan.hidden = number_or_zero(json, "hidden");
   scan.clutter = number_or_zero(json, "clutter");
+  if (const auto others = json.find("other_placements"); others != json.end() && others->is_array()) {
+    for (const Json& other : *others) scan.other_placements.push_back(other_placement_of(other, where));
+  }
   return scan;
 }
 
@@ -88,6 +102,13 @@ Truth truth_of(const Json& json) {
 }
 
 }  // namespace
+
+std::vector<TruePlacement> TrueScan::placements() const {
+  std::vector<TruePlacement> all;
+  if (model_from_scan) all.push_back({*model_from_scan, 1, occlusion, hidden});
+  all.insert(all.end(), other_placements.begin(), other_placements.end());
+  return all;
+}
 
 Result<Truth> read_truth(const std::filesystem::path& path) {
   std::error_code ignored;

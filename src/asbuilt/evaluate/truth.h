@@ -14,12 +14,22 @@
 
 namespace asbuilt::evaluate {
 
+/// Where the part stands in a scan.
+struct TruePlacement {
+  Pose model_from_scan = Pose::Identity();
+  std::uint8_t label = 1;  ///< of its points
+  double occlusion = 0.0, hidden = 0.0;
+};
+
 /// What is known about one scan. Paths are as in the file, relative to its folder.
 struct TrueScan {
   std::filesystem::path path;
   std::filesystem::path labels;         ///< empty if there are none
   std::optional<Pose> model_from_scan;  ///< empty: the part is not there
   double occlusion = 0.0, hidden = 0.0, clutter = 0.0;
+  std::vector<TruePlacement> other_placements;  ///< further ones of the same body; optional in the file
+
+  [[nodiscard]] std::vector<TruePlacement> placements() const;  ///< all of them, the first one first
 };
 
 /// truth.json, schema 1 (docs/simulate.md).

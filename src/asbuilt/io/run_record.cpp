@@ -68,7 +68,16 @@ Json json_of(const CandidateRecord& candidate) {
           {"rms", json_number(candidate.rms)},
           {"hidden_share", json_number(candidate.hidden_share)},
           {"support", json_number(candidate.support)},
-          {"explained_samples", candidate.explained_samples}};
+          {"explained_samples", candidate.explained_samples},
+          {"facing_share", json_number(candidate.facing_share)},
+          {"found_share", json_number(candidate.found_share)},
+          {"contradiction_share", json_number(candidate.contradiction_share)},
+          {"missing_share", json_number(candidate.missing_share)},
+          {"residual_ratio", json_number(candidate.residual_ratio)},
+          {"weakest_direction", json_number(candidate.weakest_direction)},
+          {"slip_lead", json_number(candidate.slip_lead)},
+          {"overrun_share", json_number(candidate.overrun_share)},
+          {"objection", candidate.objection}};
 }
 
 Json json_of(const ScanRecord& scan) {
@@ -78,6 +87,8 @@ Json json_of(const ScanRecord& scan) {
           {"name", scan.name},
           {"index_in_file", scan.index_in_file},
           {"scans_in_file", scan.scans_in_file},
+          {"instance", scan.instance},
+          {"instances_in_scan", scan.instances_in_scan},
           {"sha256", scan.sha256},
           {"points", scan.points},
           {"viewpoint", scan.viewpoint ? json_of(*scan.viewpoint) : Json(nullptr)},
@@ -144,6 +155,11 @@ double number_at(const Json& object, const char* key) {
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
 
+// Of a field that came later: results of earlier versions do not have it.
+double later_number_at(const Json& object, const char* key) {
+  return object.contains(key) ? number_at(object, key) : std::numeric_limits<double>::quiet_NaN();
+}
+
 template <int Size>
 Eigen::Matrix<double, Size, Size> matrix_of(const Json& rows) {
   Eigen::Matrix<double, Size, Size> matrix;
@@ -198,6 +214,15 @@ CandidateRecord candidate_of(const Json& json) {
   candidate.hidden_share = number_at(json, "hidden_share");
   candidate.support = number_at(json, "support");
   candidate.explained_samples = json.at("explained_samples").get<int>();
+  candidate.facing_share = later_number_at(json, "facing_share");
+  candidate.found_share = later_number_at(json, "found_share");
+  candidate.contradiction_share = later_number_at(json, "contradiction_share");
+  candidate.missing_share = later_number_at(json, "missing_share");
+  candidate.residual_ratio = later_number_at(json, "residual_ratio");
+  candidate.weakest_direction = later_number_at(json, "weakest_direction");
+  candidate.slip_lead = later_number_at(json, "slip_lead");
+  candidate.overrun_share = later_number_at(json, "overrun_share");
+  candidate.objection = json.value("objection", "");
   return candidate;
 }
 
@@ -207,6 +232,8 @@ ScanRecord scan_of(const Json& json) {
   scan.name = json.at("name").get<std::string>();
   scan.index_in_file = json.at("index_in_file").get<int>();
   scan.scans_in_file = json.at("scans_in_file").get<int>();
+  scan.instance = json.value("instance", 1);
+  scan.instances_in_scan = json.value("instances_in_scan", 1);
   scan.sha256 = json.at("sha256").get<std::string>();
   scan.points = json.at("points").get<std::uint64_t>();
   if (!json.at("viewpoint").is_null()) scan.viewpoint = vector_of(json.at("viewpoint"));

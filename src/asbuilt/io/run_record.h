@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -42,14 +43,25 @@ struct CandidateRecord {
   double votes = 0.0, score = 0.0, visible_share = 0.0, free_space_violations = 0.0, normal_agreement = 0.0, rms = 0.0;
   double hidden_share = 0.0, support = 0.0;
   int explained_samples = 0;
+  /// Of the surface that ought to be visible (facing_share of all) and is not hidden: confirmed, denied, without
+  /// return. NaN in results of versions that did not tell.
+  double facing_share = kNotTold, found_share = kNotTold, contradiction_share = kNotTold, missing_share = kNotTold;
+  double residual_ratio = kNotTold;     ///< rms / distance that counts as on the model
+  double weakest_direction = kNotTold;  ///< how firmly the surface that was found holds the pose
+  double slip_lead = kNotTold;          ///< measurements by which the pose leads over the small slip that comes closest
+  double overrun_share = kNotTold;      ///< of the part's edges, those past which the scan's surface goes on
+  std::string objection;                ///< reason code of what stands against it on its own; empty: nothing
+
+  static constexpr double kNotTold = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct ScanRecord {
   std::string path;  ///< as the user gave it
   std::string name;
   int index_in_file = 0, scans_in_file = 1;
-  std::string sha256;        ///< of the file; empty when it could not be read
-  std::uint64_t points = 0;  ///< usable ones, after sanitising
+  int instance = 1, instances_in_scan = 1;  ///< which placement of the part in the scan, of how many that were found
+  std::string sha256;                       ///< of the file; empty when it could not be read
+  std::uint64_t points = 0;                 ///< usable ones, after sanitising
   std::optional<Eigen::Vector3d> viewpoint;
   std::string viewpoint_kind = "none";  ///< "point" (a position), "direction" (in which parallel rays fly) or "none"
   bool normals_oriented = false;

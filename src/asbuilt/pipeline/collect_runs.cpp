@@ -44,7 +44,7 @@ Result<void> copy_segment(const fs::path& from, const fs::path& to) {
 std::vector<io::ScanRecord*> scans_named(const std::string& typed, io::RunRecord& record) {
   std::vector<io::ScanRecord*> named;
   for (io::ScanRecord& scan : record.scans) {
-    if (names_scan(typed, scan.path, scan.name)) named.push_back(&scan);
+    if (names_entry(typed, scan)) named.push_back(&scan);
   }
   return named;
 }
@@ -65,7 +65,9 @@ Result<void> exclude(const std::string& typed, io::RunRecord& record) {
 
 Result<void> accept(const std::string& text, io::RunRecord& record) {
   ASBUILT_TRY(acceptance, parse_acceptance(text));
-  const auto named = scans_named(acceptance.scan, record);
+  auto named = scans_named(acceptance.scan, record);
+  // Among several placements of a scan its name stands for the first, as `explain` prints it.
+  if (named.size() > 1) std::erase_if(named, [&](const io::ScanRecord* scan) { return scan->instance > 1; });
   if (named.size() != 1) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("--accept {}: {} scans have this name, expected one", text, named.size()));

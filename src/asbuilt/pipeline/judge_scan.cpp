@@ -7,6 +7,7 @@
 
 #include "asbuilt/detect/detect.h"
 #include "asbuilt/pipeline/unit_check.h"
+#include "asbuilt/verify/instances.h"
 #include "asbuilt/verify/verify.h"
 
 namespace asbuilt::pipeline {
@@ -54,16 +55,27 @@ void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::Sca
 }
 
 io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Vector3d& offset_mm) {
-  return {for_file(candidate.model_from_scan, offset_mm),
-          candidate.votes,
-          candidate.score,
-          candidate.visible_share,
-          candidate.free_space_violations,
-          candidate.normal_agreement,
-          candidate.rms_mm,
-          candidate.hidden_share,
-          candidate.support,
-          candidate.explained_samples};
+  io::CandidateRecord record;
+  record.model_from_scan = for_file(candidate.model_from_scan, offset_mm);
+  record.votes = candidate.votes;
+  record.score = candidate.score;
+  record.visible_share = candidate.visible_share;
+  record.free_space_violations = candidate.free_space_violations;
+  record.normal_agreement = candidate.normal_agreement;
+  record.rms = candidate.rms_mm;
+  record.hidden_share = candidate.hidden_share;
+  record.support = candidate.support;
+  record.explained_samples = candidate.explained_samples;
+  record.facing_share = candidate.facing_share;
+  record.found_share = candidate.found_share;
+  record.contradiction_share = candidate.contradiction_share;
+  record.missing_share = candidate.missing_share;
+  record.residual_ratio = candidate.residual_ratio;
+  record.weakest_direction = candidate.weakest_direction;
+  record.slip_lead = candidate.slip_lead;
+  record.overrun_share = candidate.overrun_share;
+  record.objection = verify::code_of(candidate.objection);
+  return record;
 }
 
 void describe_detection(io::ScanRecord& record, const verify::Detection& detection) {
@@ -101,12 +113,28 @@ std::vector<detect::Hypothesis> with_starts(std::vector<detect::Hypothesis> hypo
   return all;
 }
 
-std::optional<int> accepted_candidate(const io::ScanFile& file, const Options& options) {
+/// The candidate that --accept names for a placement of this scan. The scan's name stands for the first placement.
+std::optional<int> accepted_candidate(const io::ScanFile& file, std::size_t instance, const Options& options) {
   for (const std::string& text : options.accept) {
     const auto acceptance = parse_acceptance(text);  // validated before
-    if (acceptance && names_scan(acceptance->scan, file.path.string(), file.name)) return acceptance->candidate;
+    const bool is_named = acceptance->scan == fmt::format("{}#{}", file.name, instance) ||
+                          (instance == 1 && names_scan(acceptance->scan, file.path.string(), file.name));
+    if (is_named) return acceptance->candidate;
   }
   return std::nullopt;
+}
+
+/// Refuses an --accept for a placement that was not found.
+Result<void> check_acceptances(const io::ScanFile& file, std::size_t placements, const Options& options) {
+  for (const std::string& text : options.accept) {
+    const std::string named = parse_acceptance(text)->scan;
+    bool known = !named.starts_with(file.name + "#");
+    for (std::size_t i = 1; i <= placements; ++i) known = known || named == fmt::format("{}#{}", file.name, i);
+    if (known) continue;
+    return fail(ErrorCode::not_possible,
+                fmt::format("--accept {}: {} placement(s) of the part were found in {}", text, placements, file.name));
+  }
+  return {};
 }
 
 /// Verifies again with the one candidate that the user vouches for.
@@ -119,13 +147,27 @@ Result<verify::Detection> accept_for_user(const verify::Detection& detection, in
   }
   const verify::Candidate& chosen = detection.candidates[index];
   const std::vector<detect::Hypothesis> hypothesis{{chosen.model_from_scan, chosen.votes}};
-  return verify::verify(scan, half.model.prepared, hypothesis, half.options.verify, context, true);
+  ASBUILT_TRY(accepted, verify::verify(scan, half.model.prepared, hypothesis, half.options.verify, context, true));
+  accepted.candidates = detection.candidates;  // the list the user chose from
+  return std::move(accepted);
+}
+
+/// The one placement, or all of them, as the user wants.
+Result<std::vector<verify::Detection>> placements_in(const scan::Scan& scan,
+                                                     const std::vector<detect::Hypothesis>& hypotheses,
+                                                     const ScanHalf& half, const Context& context) {
+  const model::PreparedModel& model = half.model.prepared;
+  if (half.options.instances == Instances::all) {
+    return verify::verify_instances(scan, model, hypotheses, half.options.verify, context);
+  }
+  ASBUILT_TRY(detection, verify::verify(scan, model, hypotheses, half.options.verify, context));
+  return std::vector<verify::Detection>{std::move(detection)};
 }
 
 }  // namespace
 
-Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
-                              const Context& context) {
+Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
+                                           const Context& context) {
   JudgedScan judged;
   Result<scan::Scan> scan;
   {
@@ -138,7 +180,7 @@ Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, Ru
     judged.record.status = io::ScanStatus::rejected;
     judged.record.reason_code = verify::code_of(verify::Reason::scan_too_small);
     judged.record.reason = *contradiction;
-    return judged;
+    return std::vector<JudgedScan>{std::move(judged)};
   }
 
   Result<std::vector<detect::Hypothesis>> hypotheses;
@@ -149,18 +191,29 @@ Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, Ru
   if (!hypotheses) return tl::unexpected(hypotheses.error());
 
   const auto timed = folder.stage("verify", file.name);
-  const auto candidates = with_starts(std::move(*hypotheses), file, half.starts);
-  ASBUILT_TRY(detection, verify::verify(*scan, half.model.prepared, candidates, half.options.verify, context));
-  const auto vouched_for = accepted_candidate(file, half.options);
-  if (vouched_for) {
-    ASBUILT_TRY(accepted, accept_for_user(detection, *vouched_for, *scan, file, half, context));
-    accepted.candidates = detection.candidates;  // the list the user chose from
-    detection = std::move(accepted);
+  const auto starts = with_starts(std::move(*hypotheses), file, half.starts);
+  ASBUILT_TRY(placements, placements_in(*scan, starts, half, context));
+  ASBUILT_CHECK(check_acceptances(file, placements.size(), half.options));
+  bool chosen_by_user = false;
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const auto candidate = accepted_candidate(file, i + 1, half.options);
+    if (!candidate) continue;
+    ASBUILT_TRY(accepted, accept_for_user(placements[i], *candidate, *scan, file, half, context));
+    placements[i] = std::move(accepted);
+    chosen_by_user = true;
   }
-  describe_detection(judged.record, detection);
-  if (vouched_for) judged.record.reason_code = "accepted_by_user";
-  if (!detection.segment.empty()) judged.segment = cut_out(*scan, detection, half.model.prepared);
-  return judged;
+  if (chosen_by_user) verify::separate_segments(placements, *scan, half.model.prepared, context);
+  std::vector<JudgedScan> entries;
+  for (const verify::Detection& detection : placements) {
+    JudgedScan entry = judged;
+    entry.record.instance = static_cast<int>(entries.size()) + 1;
+    entry.record.instances_in_scan = static_cast<int>(placements.size());
+    describe_detection(entry.record, detection);
+    if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
+    if (!detection.segment.empty()) entry.segment = cut_out(*scan, detection, half.model.prepared);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
 }
 
 }  // namespace asbuilt::pipeline

@@ -27,15 +27,16 @@ struct ScanHalf {
   const std::vector<io::NamedPose>& starts;
 };
 
-/// A scan's entry in the record, and its part if there is one.
+/// An entry of a scan in the record, and its part if there is one.
 struct JudgedScan {
   io::ScanRecord record;
   std::optional<Segment> segment;
 };
 
-/// Prepares a scan, detects the part in it and verifies; poses in the record are for the coordinates of the file.
-/// Errors: those of the stages; nothing is decided then.
-[[nodiscard]] Result<JudgedScan> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
-                                            const Context& context);
+/// Prepares a scan, detects the part in it and verifies; poses in the record are for the coordinates of the file. One
+/// entry, or with `Instances::all` one for each placement of the part, best first; where there is none, one that says
+/// why. Errors: those of the stages; nothing is decided then.
+[[nodiscard]] Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanHalf& half,
+                                                         RunFolder& folder, const Context& context);
 
 }  // namespace asbuilt::pipeline

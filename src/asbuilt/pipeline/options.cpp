@@ -12,6 +12,7 @@ namespace asbuilt::pipeline {
 namespace {
 
 constexpr std::string_view kGaugeNames[] = {"best_fit", "fixed"};
+constexpr std::string_view kInstancesNames[] = {"one", "all"};
 
 io::OptionValue value_of(bool value) { return value; }
 io::OptionValue value_of(int value) { return std::int64_t{value}; }
@@ -64,6 +65,12 @@ bool take(Gauge& target, const io::OptionValue& value) {
   target = *held == kGaugeNames[1] ? Gauge::fixed : Gauge::best_fit;
   return *held == kGaugeNames[0] || *held == kGaugeNames[1];
 }
+bool take(Instances& target, const io::OptionValue& value) {
+  const auto* held = std::get_if<std::string>(&value);
+  if (held == nullptr) return false;
+  target = *held == kInstancesNames[1] ? Instances::all : Instances::one;
+  return *held == kInstancesNames[0] || *held == kInstancesNames[1];
+}
 
 std::string unit_name(io::Unit unit) {
   return unit == io::Unit::stated ? std::string("stated") : std::string(io::name_of(unit));
@@ -109,6 +116,7 @@ io::Options recorded(const Options& options, std::initializer_list<Half> halves)
     record.emplace_back("poses", options.poses);
     record.emplace_back("exclude", options.exclude);
     record.emplace_back("accept", options.accept);
+    record.emplace_back("instances", std::string(kInstancesNames[static_cast<int>(options.instances)]));
     record.emplace_back("seed", static_cast<std::int64_t>(options.seed));
     record.emplace_back("paper_mode", options.paper_mode);
   }
@@ -146,6 +154,7 @@ Result<void> take_over(Options& options, const io::Options& record) {
   ASBUILT_CHECK(assign("poses", options.poses));
   ASBUILT_CHECK(assign("exclude", options.exclude));
   ASBUILT_CHECK(assign("accept", options.accept));
+  ASBUILT_CHECK(assign("instances", options.instances));
   ASBUILT_CHECK(assign("seed", options.seed));
   ASBUILT_CHECK(assign("paper_mode", options.paper_mode));
   ASBUILT_CHECK(assign("gauge", options.gauge));

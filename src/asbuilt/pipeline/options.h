@@ -24,6 +24,10 @@ namespace asbuilt::pipeline {
 /// Where the whole finally stands in the model frame.
 enum class Gauge { best_fit, fixed };
 
+/// Which placements of the part in one scan are wanted. `one`: a second one makes the scan ambiguous. `all`: each is a
+/// detection of its own; they are then taken to be the same casting, or as good as.
+enum class Instances { one, all };
+
 /// Everything a user can choose; the stages' own options and what lies between them.
 struct Options {
   io::Unit model_unit = io::Unit::stated, scan_unit = io::Unit::stated;
@@ -31,6 +35,7 @@ struct Options {
   std::string poses;                 ///< file with starts for detection; empty: none
   std::vector<std::string> exclude;  ///< scans, by name or path
   std::vector<std::string> accept;   ///< SCAN:CANDIDATE, candidates counted from 0 as in result.json
+  Instances instances = Instances::one;
   std::uint64_t seed = 0;
   bool paper_mode = false;  ///< exactly the published method, in every stage
   bool mesh = false;        ///< a surface mesh beside the cloud

@@ -12,6 +12,7 @@
 #include "asbuilt/pipeline/as_detected.h"
 #include "asbuilt/pipeline/judge_scan.h"
 #include "asbuilt/pipeline/pipeline_version.h"
+#include "asbuilt/pipeline/scan_hints.h"
 #include "asbuilt/pipeline/unit_check.h"
 
 namespace asbuilt::pipeline {
@@ -46,9 +47,15 @@ io::ScanRecord failed_record(const std::string& path, std::string name, const Er
   return record;
 }
 
+bool is_left_out(const io::ScanRecord& entry, const Options& options) {
+  return std::ranges::any_of(options.exclude, [&](const std::string& typed) { return names_entry(typed, entry); });
+}
+
 bool is_excluded(const std::string& path, const std::string& name, const Options& options) {
   return std::ranges::any_of(options.exclude, [&](const std::string& typed) { return names_scan(typed, path, name); });
 }
+
+constexpr const char* kLeftOut = "left out by --exclude";
 
 io::ScanRecord excluded_record(const io::ScanFile& file, const std::string& path) {
   io::ScanRecord record;
@@ -57,8 +64,18 @@ io::ScanRecord excluded_record(const io::ScanFile& file, const std::string& path
   record.points = file.cloud.size();
   record.status = io::ScanStatus::rejected;
   record.reason_code = "excluded";
-  record.reason = "left out by --exclude";
+  record.reason = kLeftOut;
   return record;
+}
+
+/// Leaves single placements out, which only judging the scan could tell.
+void leave_out(JudgedScan& entry) {
+  entry.record.status = io::ScanStatus::rejected;
+  entry.record.reason_code = "excluded";
+  entry.record.reason = kLeftOut;
+  entry.record.model_from_scan.reset();
+  entry.record.segment_points = 0;
+  entry.segment.reset();
 }
 
 /// The same options as far as the scan half is concerned, apart from those that name single scans.
@@ -82,13 +99,21 @@ class FinishedScans {
     }
   }
 
-  /// The finished entry of the scan that now has this index, or nothing.
-  [[nodiscard]] const io::ScanRecord* find(std::size_t index, const std::string& path, const std::string& sha256,
-                                           int index_in_file, const Options& options) const {
-    if (!earlier_ || index >= earlier_->scans.size()) return nullptr;
-    const io::ScanRecord& scan = earlier_->scans[index];
-    const bool same = scan.path == path && scan.sha256 == sha256 && scan.index_in_file == index_in_file;
-    return same && stands(scan, index, options) ? &scan : nullptr;
+  /// The finished entries of the scan whose first entry now has this index: all of them, or none.
+  [[nodiscard]] std::vector<io::ScanRecord> find(std::size_t index, const std::string& path, const std::string& sha256,
+                                                 int index_in_file, const Options& options) const {
+    std::vector<io::ScanRecord> entries;
+    if (!earlier_) return entries;
+    for (std::size_t i = index; i < earlier_->scans.size(); ++i) {
+      const io::ScanRecord& scan = earlier_->scans[i];
+      const bool same = scan.path == path && scan.sha256 == sha256 && scan.index_in_file == index_in_file &&
+                        scan.instance == static_cast<int>(entries.size()) + 1;
+      if (!same || !stands(scan, i, options)) break;
+      entries.push_back(scan);
+    }
+    const bool complete = !entries.empty() && entries.size() == static_cast<std::size_t>(entries[0].instances_in_scan);
+    if (!complete) entries.clear();
+    return entries;
   }
 
  private:
@@ -97,7 +122,7 @@ class FinishedScans {
     const auto redone = {io::ScanStatus::failed, io::ScanStatus::dropped, io::ScanStatus::disconnected};
     if (std::ranges::find(redone, scan.status) != redone.end()) return false;
     const bool named = scan.reason_code == "excluded" || scan.reason_code == "accepted_by_user" ||
-                       is_excluded(scan.path, scan.name, options) || !options.accept.empty();
+                       is_left_out(scan, options) || !options.accept.empty();
     if (named) return false;
     return !scan.has_segment() || fs::exists(folder_.file(io::segment_file(index, scan.name)));
   }
@@ -108,10 +133,10 @@ class FinishedScans {
 
 Result<void> check_names(std::span<const std::string> scan_paths, const Options& options) {
   const auto known = [&](const std::string& typed) {
-    // A file with several scans names them NAME_NN, which only reading it tells.
+    // A file with several scans names them NAME_NN, several placements are NAME#N, which only the work itself tells.
     return std::ranges::any_of(scan_paths, [&](const std::string& path) {
       const std::string stem = fs::path(path).stem().string();
-      return names_scan(typed, path, stem) || typed.starts_with(stem + "_");
+      return names_scan(typed, path, stem) || typed.starts_with(stem + "_") || typed.starts_with(stem + "#");
     });
   };
   for (const std::string& typed : options.exclude) {
@@ -158,21 +183,24 @@ class ScanHalfRun {
     }
     for (io::ScanFile& file : *input.scans) {
       if (context_.cancelled()) return fail(ErrorCode::cancelled, "interrupted");
-      io::ScanRecord record;
-      if (const auto* finished =
-              finished_.find(record_.scans.size(), path, input.sha256, file.index_in_file, half_.options)) {
-        record = as_detected(*finished);
-      } else {
+      std::vector<io::ScanRecord> entries =
+          finished_.find(record_.scans.size(), path, input.sha256, file.index_in_file, half_.options);
+      if (entries.empty()) {
         ASBUILT_TRY(judged, judge(file, path));
-        record = std::move(judged);
+        entries = std::move(judged);
+      } else {
+        for (io::ScanRecord& entry : entries) entry = as_detected(std::move(entry));
       }
-      record.path = path;
-      record.name = file.name;
-      record.sha256 = input.sha256;
-      record.index_in_file = file.index_in_file;
-      record.scans_in_file = static_cast<int>(input.scans->size());
       file.cloud = {};  // one scan at a time
-      ASBUILT_CHECK(add(std::move(record)));
+      for (io::ScanRecord& entry : entries) {
+        entry.path = path;
+        entry.name = entry_name(file.name, entry.instance);
+        entry.sha256 = input.sha256;
+        entry.index_in_file = file.index_in_file;
+        entry.scans_in_file = static_cast<int>(input.scans->size());
+        record_.scans.push_back(std::move(entry));
+      }
+      ASBUILT_CHECK(folder_.checkpoint(record_));
     }
     return {};
   }
@@ -183,23 +211,31 @@ class ScanHalfRun {
     return folder_.checkpoint(record_);
   }
 
-  /// The entry of one scan; an error only if the whole run must stop.
-  Result<io::ScanRecord> judge(const io::ScanFile& file, const std::string& path) {
-    if (is_excluded(path, file.name, half_.options)) return excluded_record(file, path);
+  /// The entries of one scan; an error only if the whole run must stop.
+  Result<std::vector<io::ScanRecord>> judge(const io::ScanFile& file, const std::string& path) {
+    using Entries = std::vector<io::ScanRecord>;
+    if (is_excluded(path, file.name, half_.options)) return Entries{excluded_record(file, path)};
     auto judged = judged_in_bounded_memory(file);
-    if (judged) {
-      if (judged->segment) ASBUILT_CHECK(write(*judged, file.name));
-      for (const std::string& warning : judged->record.warnings) {
-        context_.warn(fmt::format("{}: {}", path, warning));
-      }
-      return std::move(judged->record);
+    if (!judged) {
+      if (judged.error().code == ErrorCode::cancelled) return tl::unexpected(judged.error());
+      context_.warn(judged.error().message);
+      return Entries{failed_record(path, file.name, judged.error())};
     }
-    if (judged.error().code == ErrorCode::cancelled) return tl::unexpected(judged.error());
-    context_.warn(judged.error().message);
-    return failed_record(path, file.name, judged.error());
+    for (const std::string& warning : judged->front().record.warnings) {
+      context_.warn(fmt::format("{}: {}", path, warning));
+    }
+    Entries entries;
+    for (JudgedScan& entry : *judged) {
+      entry.record.path = path;
+      entry.record.name = entry_name(file.name, entry.record.instance);
+      if (is_left_out(entry.record, half_.options)) leave_out(entry);
+      if (entry.segment) ASBUILT_CHECK(write(entry, record_.scans.size() + entries.size()));
+      entries.push_back(std::move(entry.record));
+    }
+    return entries;
   }
 
-  Result<JudgedScan> judged_in_bounded_memory(const io::ScanFile& file) {
+  Result<std::vector<JudgedScan>> judged_in_bounded_memory(const io::ScanFile& file) {
     try {
       return judge_scan(file, half_, folder_, context_);
     } catch (const std::bad_alloc&) {
@@ -208,9 +244,9 @@ class ScanHalfRun {
     }
   }
 
-  Result<void> write(const JudgedScan& judged, const std::string& name) {
-    const auto timed = folder_.stage("write_segment", name);
-    const fs::path path = folder_.file(io::segment_file(record_.scans.size(), name));
+  Result<void> write(const JudgedScan& judged, std::size_t index) {
+    const auto timed = folder_.stage("write_segment", judged.record.name);
+    const fs::path path = folder_.file(io::segment_file(index, judged.record.name));
     std::error_code error;
     fs::create_directories(path.parent_path(), error);
     if (error) {

@@ -41,6 +41,17 @@ bool names_scan(std::string_view typed, std::string_view path, std::string_view 
   return std::filesystem::path(typed) == std::filesystem::path(path).filename();
 }
 
+bool names_entry(std::string_view typed, const io::ScanRecord& entry) {
+  if (names_scan(typed, entry.path, entry.name)) return true;
+  std::string_view scan_name = entry.name;
+  if (entry.instance > 1) scan_name = scan_name.substr(0, scan_name.rfind('#'));
+  return typed == scan_name || typed == fmt::format("{}#{}", scan_name, entry.instance);
+}
+
+std::string entry_name(std::string_view scan_name, int instance) {
+  return instance == 1 ? std::string(scan_name) : fmt::format("{}#{}", scan_name, instance);
+}
+
 Result<Viewpoints> Viewpoints::from_text(const std::string& text, io::Unit scan_unit) {
   Viewpoints viewpoints;
   if (text == "auto") return viewpoints;

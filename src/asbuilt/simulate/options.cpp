@@ -41,6 +41,7 @@ Result<void> SimulateOptions::validate() const {
   ASBUILT_CHECK(check("clutter_objects", clutter_objects, 0, 200));
   ASBUILT_CHECK(check_range("clutter", clutter_low, clutter_high));
   ASBUILT_CHECK(check_range("hidden", hidden_low, hidden_high));
+  ASBUILT_CHECK(check("instances", instances, 1, 10));
   ASBUILT_CHECK(check("absent_share", absent_share, 0.0, 1.0));
   ASBUILT_CHECK(check("decoys", decoys, 0, 20));
   ASBUILT_CHECK(check("decoy_scale", decoy_scale, 0.1, 2.0));

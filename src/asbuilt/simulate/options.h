@@ -30,6 +30,7 @@ struct SimulateOptions {
   double clutter_high = 0.85;  ///< ... is kept in this range where it can be; a laser scanner sees its whole hall
   double hidden_low = 0.0;     ///< share of the otherwise visible part that other things cover ...
   double hidden_high = 0.2;    ///< ... drawn from this range for each scan
+  int instances = 1;           ///< placements of the part in each scan that shows it, [1, 10]
   bool floor = true;
   bool walls = false;         ///< structured light only; a laser scanner always stands in a hall
   double absent_share = 0.0;  ///< share of scans without the part, [0, 1]
@@ -63,6 +64,7 @@ void for_each_field(SimulateOptions& options, Visitor&& field) {
   field("clutter_high", options.clutter_high, "greatest share of the scene that is not the part (structured light)");
   field("hidden_low", options.hidden_low, "least share of the visible part that is covered");
   field("hidden_high", options.hidden_high, "greatest share of the visible part that is covered");
+  field("instances", options.instances, "placements of the part in each scan that shows it");
   field("floor", options.floor, "a floor under everything");
   field("walls", options.walls, "walls around everything (always with a laser scanner)");
   field("absent_share", options.absent_share, "share of scans without the part");

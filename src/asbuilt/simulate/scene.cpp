@@ -65,7 +65,8 @@ Eigen::Matrix3d looking_along(const Eigen::Vector3d& forward) {
   return axes;
 }
 
-Sensor placed_sensor(SensorKind kind, const Eigen::Vector3d& target, double size, Random& random) {
+Sensor placed_sensor(const SimulateOptions& options, const Eigen::Vector3d& target, double size, Random& random) {
+  const SensorKind kind = options.sensor_kind();
   Sensor sensor;
   sensor.kind = kind;
   const double azimuth = random.uniform(0.0, 2.0 * kPi);
@@ -85,7 +86,9 @@ Sensor placed_sensor(SensorKind kind, const Eigen::Vector3d& target, double size
   for (int k = 0; k < 3; ++k) aim[k] += random.uniform(-0.06, 0.06) * size;
   sensor.world_from_scan.linear() = looking_along(-offset);
   sensor.world_from_scan.translation() = aim + offset;
-  sensor.half_width = random.uniform(0.5, 0.8) * size / distance;
+  // Further placements need room in the field beside the first.
+  const double field = 1.0 + 0.6 * std::sqrt(static_cast<double>(options.instances - 1));
+  sensor.half_width = field * random.uniform(0.5, 0.8) * size / distance;
   sensor.near_mm = 0.4 * distance;
   sensor.far_mm = 1.9 * distance;
   return sensor;
@@ -110,7 +113,43 @@ TriangleMesh surroundings(const SimulateOptions& options, double size) {
   return merged(slabs);
 }
 
-// What may still be placed where: all bodies so far as points, and which samples of the part are still seen.
+// A placement of the part as the sensor sees it: samples of its surface, and which of them are still seen.
+class SeenPlacement {
+ public:
+  SeenPlacement(const TriangleMesh& mesh_in_world, const Sensor& sensor, Random random)
+      : samples_(area_samples(mesh_in_world, kTruthSamples, random)),
+        unobstructed_(visible_samples(samples_, model::RayScene(mesh_in_world), sensor)),
+        seen_(unobstructed_) {}
+
+  [[nodiscard]] const std::vector<SurfacePoint>& samples() const { return samples_; }
+  [[nodiscard]] const std::vector<std::size_t>& seen() const { return seen_; }
+  [[nodiscard]] double hidden() const { return hidden_if(seen_); }
+  [[nodiscard]] double hidden_if(const std::vector<std::size_t>& seen) const {
+    if (unobstructed_.empty()) return 1.0;
+    return 1.0 - static_cast<double>(seen.size()) / static_cast<double>(unobstructed_.size());
+  }
+  [[nodiscard]] double seen_share() const {
+    return static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
+  }
+  [[nodiscard]] bool is_in_view(const Sensor& sensor) const {
+    return std::ranges::all_of(samples_, [&](const SurfacePoint& s) { return sensor.has_in_view(s.position); });
+  }
+
+  // What would still be seen with another thing in the scene.
+  [[nodiscard]] std::vector<std::size_t> seen_past(const model::RayScene& thing, const Sensor& sensor) const {
+    const std::vector<std::size_t> covered = covered_samples(samples_, seen_, thing, sensor);
+    std::vector<std::size_t> left;
+    std::ranges::set_difference(seen_, covered, std::back_inserter(left));
+    return left;
+  }
+  void set_seen(std::vector<std::size_t> seen) { seen_ = std::move(seen); }
+
+ private:
+  std::vector<SurfacePoint> samples_;
+  std::vector<std::size_t> unobstructed_, seen_;
+};
+
+// What may still be placed where: all bodies so far as points, and what is still seen of each placement of the part.
 class Arrangement {
  public:
   Arrangement(const TriangleMesh& part, const SimulateOptions& options, std::uint64_t index, bool has_part,
@@ -119,21 +158,18 @@ class Arrangement {
     const Pose world_from_part = standing(part, part_rotation(part, options, index, random), 0.0, 0.0);
     const TriangleMesh part_in_world = transformed(part, world_from_part);
     const Eigen::Vector3d target = bounding_box(part_in_world).center();
-    scene_.sensor = placed_sensor(options.sensor_kind(), target, size_, random);
+    scene_.sensor = placed_sensor(options, target, size_, random);
     scene_.meshes_in_world = {surroundings(options, size_), has_part ? part_in_world : TriangleMesh{}};
     if (!has_part) return;
     scene_.world_from_model = world_from_part;
-    samples_ = area_samples(part_in_world, kTruthSamples, Random(options.seed, "truth", index));
-    unobstructed_ = visible_samples(samples_, model::RayScene(part_in_world), scene_.sensor);
-    seen_ = unobstructed_;
+    placements_.emplace_back(part_in_world, scene_.sensor, Random(options.seed, "truth", index));
     occupy(positions(area_samples(part_in_world, kContactSamples, Random(options.seed, "contact", index))));
   }
 
   [[nodiscard]] double size() const { return size_; }
   [[nodiscard]] const Sensor& sensor() const { return scene_.sensor; }
-  [[nodiscard]] double hidden() const { return share_lost(seen_.size()); }
-  [[nodiscard]] const std::vector<SurfacePoint>& samples() const { return samples_; }
-  [[nodiscard]] const std::vector<std::size_t>& seen() const { return seen_; }
+  // Of the part itself, not of its further placements; there must be one.
+  [[nodiscard]] const SeenPlacement& part() const { return placements_.front(); }
 
   // Whether the points keep the gap from all bodies, the sensor, and the floor's underside.
   [[nodiscard]] bool is_free(const Points& points) const {
@@ -148,20 +184,33 @@ class Arrangement {
     return true;
   }
 
-  // Puts a thing there unless it would touch another or hide more than is allowed.
+  // Puts a thing there unless it would touch another or hide more of a placement than is allowed.
   bool add(const TriangleMesh& mesh_in_world, double most_hidden, Random& random) {
     const Points points = positions(area_samples(mesh_in_world, kBodySamples, Random(random.bits(), "body", 0)));
     if (!is_free(points)) return false;
-    if (!samples_.empty()) {
-      const std::vector<std::size_t> covered =
-          covered_samples(samples_, seen_, model::RayScene(mesh_in_world), scene_.sensor);
-      if (share_lost(seen_.size() - covered.size()) > most_hidden) return false;
-      std::vector<std::size_t> left;
-      std::ranges::set_difference(seen_, covered, std::back_inserter(left));
-      seen_ = std::move(left);
+    const model::RayScene rays(mesh_in_world);
+    std::vector<std::vector<std::size_t>> left;
+    for (const SeenPlacement& placement : placements_) {
+      left.push_back(placement.seen_past(rays, scene_.sensor));
+      if (placement.hidden_if(left.back()) > most_hidden) return false;
     }
+    for (std::size_t i = 0; i < placements_.size(); ++i) placements_[i].set_seen(std::move(left[i]));
     scene_.meshes_in_world.push_back(mesh_in_world);
     occupy(points);
+    return true;
+  }
+
+  // Puts the part there once more, wholly in view, before any clutter is there.
+  bool add_copy(const TriangleMesh& part, const Pose& world_from_part, double most_hidden, Random& random) {
+    const TriangleMesh mesh_in_world = transformed(part, world_from_part);
+    SeenPlacement copy(mesh_in_world, scene_.sensor, Random(options_.seed, "truth of copy", random.bits()));
+    if (!copy.is_in_view(scene_.sensor)) return false;
+    for (std::size_t i = Scene::kPart; i < scene_.meshes_in_world.size(); ++i) {
+      copy.set_seen(copy.seen_past(model::RayScene(scene_.meshes_in_world[i]), scene_.sensor));
+    }
+    if (copy.hidden() > most_hidden || !add(mesh_in_world, most_hidden, random)) return false;
+    placements_.push_back(std::move(copy));
+    scene_.copies.push_back({world_from_part, 1.0, 1.0});
     return true;
   }
 
@@ -172,26 +221,24 @@ class Arrangement {
     const model::RayScene rays(scene.meshes_in_world);
     const RayGrid grid = grid_for(8000, scene.meshes_in_world, rays, scene.sensor, noise, context);
     const auto returns = exact_returns(scene.meshes_in_world, rays, scene.sensor, grid, context);
-    const double share = static_cast<double>(seen_.size()) / static_cast<double>(samples_.size());
-    const double visible_mm2 = share * surface_area(part);
-    scene.occlusion = 1.0 - share;
-    scene.hidden = hidden();
+    const double visible_mm2 = placements_.front().seen_share() * surface_area(part);
+    scene.occlusion = 1.0 - placements_.front().seen_share();
+    scene.hidden = placements_.front().hidden();
     scene.clutter = 1.0 - visible_mm2 / (visible_mm2 + seen_area(returns, grid, noise, Scene::kPart));
+    for (std::size_t k = 0; k < scene.copies.size(); ++k) {
+      scene.copies[k].occlusion = 1.0 - placements_[k + 1].seen_share();
+      scene.copies[k].hidden = placements_[k + 1].hidden();
+    }
     return scene;
   }
 
  private:
   void occupy(const Points& points) { bodies_.emplace_back(points); }
-  [[nodiscard]] double share_lost(std::size_t still_seen) const {
-    if (unobstructed_.empty()) return 1.0;
-    return 1.0 - static_cast<double>(still_seen) / static_cast<double>(unobstructed_.size());
-  }
 
   const SimulateOptions& options_;
   double size_;
   Scene scene_;
-  std::vector<SurfacePoint> samples_;
-  std::vector<std::size_t> unobstructed_, seen_;
+  std::vector<SeenPlacement> placements_;  // the part, then its copies
   std::vector<KdTree> bodies_;
 };
 
@@ -232,9 +279,9 @@ bool add_thing(Arrangement& arrangement, const TriangleMesh& shape, double most_
 
 // A post, plate or beam that stands on the floor somewhere between the sensor and a part of the part still seen.
 bool add_occluder(Arrangement& arrangement, double most_hidden, Random& random) {
-  if (arrangement.seen().empty()) return false;
-  const std::size_t sample = arrangement.seen()[random.below(arrangement.seen().size())];
-  const Eigen::Vector3d target = arrangement.samples()[sample].position;
+  const std::vector<std::size_t>& seen = arrangement.part().seen();
+  if (seen.empty()) return false;
+  const Eigen::Vector3d target = arrangement.part().samples()[seen[random.below(seen.size())]].position;
   const Eigen::Vector3d eye = arrangement.sensor().position_in_world();
   const double size = arrangement.size();
   const Eigen::Vector3d place = eye + random.uniform(0.5, 0.85) * (target - eye);
@@ -247,6 +294,18 @@ bool add_occluder(Arrangement& arrangement, double most_hidden, Random& random) 
   const Eigen::Matrix3d rotation = yawed(random.uniform(0.0, 2.0 * kPi)).linear() *
                                    Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()).toRotationMatrix();
   return arrangement.add(transformed(post, standing(post, rotation, place.x(), place.y())), most_hidden, random);
+}
+
+// The part once more, beside the first; in the attitudes that are asked for.
+bool add_copy(Arrangement& arrangement, const TriangleMesh& part, const SimulateOptions& options, Random& random) {
+  for (int tries = 0; tries < 60; ++tries) {
+    const Eigen::Matrix3d rotation = options.pose == "upright" ? yawed(random.uniform(0.0, 2.0 * kPi)).linear()
+                                                               : part_rotation(part, options, 0, random);
+    const double azimuth = random.uniform(0.0, 2.0 * kPi), away = random.uniform(0.4, 1.6) * arrangement.size();
+    const Pose pose = standing(part, rotation, away * std::cos(azimuth), away * std::sin(azimuth));
+    if (arrangement.add_copy(part, pose, options.hidden_high, random)) return true;
+  }
+  return false;
 }
 
 TriangleMesh decoy_of(const TriangleMesh& part, const SimulateOptions& options) {
@@ -262,6 +321,7 @@ Scene arranged_once(const TriangleMesh& part, const SimulateOptions& options, co
   const double size = arrangement.size();
   const double reach = (options.sensor_kind() == SensorKind::laser_scanner ? 3.0 : 1.2) * size;
   const double wanted_hidden = random.uniform(options.hidden_low, options.hidden_high);
+  for (int i = 1; i < options.instances && has_part; ++i) add_copy(arrangement, part, options, random);
   if (!has_part && !companions.empty()) {
     const TriangleMesh& stand_in = companions.front();
     const Eigen::Matrix3d rotation = part_rotation(stand_in, options, index, random);
@@ -278,7 +338,7 @@ Scene arranged_once(const TriangleMesh& part, const SimulateOptions& options, co
     const TriangleMesh shape = random_shape(random, random.uniform(0.2, 0.8) * size);
     add_thing(arrangement, shape, std::max(wanted_hidden, options.hidden_low), reach, random);
   }
-  for (int tries = 0; tries < 60 && has_part && arrangement.hidden() < 0.9 * wanted_hidden; ++tries) {
+  for (int tries = 0; tries < 60 && has_part && arrangement.part().hidden() < 0.9 * wanted_hidden; ++tries) {
     add_occluder(arrangement, options.hidden_high, random);
   }
   return arrangement.finished(part, noise, context);
@@ -288,7 +348,8 @@ double outside(double value, double low, double high) { return std::max({low - v
 
 // How far the scene misses the wanted ranges.
 double miss(const Scene& scene, const SimulateOptions& options) {
-  const double hidden = outside(scene.hidden, options.hidden_low, options.hidden_high);
+  const double missing_copies = options.instances - 1 - static_cast<int>(scene.copies.size());
+  const double hidden = missing_copies + outside(scene.hidden, options.hidden_low, options.hidden_high);
   if (options.sensor_kind() == SensorKind::laser_scanner) return hidden;
   return hidden + outside(scene.clutter, options.clutter_low, options.clutter_high);
 }

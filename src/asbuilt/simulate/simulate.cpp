@@ -44,6 +44,11 @@ SimulatedScan scan_of(const Scene& scene, const SimulateOptions& options, const 
   scan.points_in_scan = raw.points_in_scan;
   for (const std::uint32_t mesh : raw.mesh_of_point) scan.labels.push_back(label_of(mesh));
   if (scene.world_from_model) scan.model_from_scan = scene.world_from_model->inverse() * scene.sensor.world_from_scan;
+  for (const PlacedCopy& copy : scene.copies) {
+    const auto mesh = Scene::kFirstCopy + static_cast<std::uint32_t>(scan.other_placements.size());
+    scan.other_placements.push_back(
+        {copy.world_from_model.inverse() * scene.sensor.world_from_scan, label_of(mesh), copy.occlusion, copy.hidden});
+  }
   scan.occlusion = scene.occlusion;
   scan.hidden = scene.hidden;
   scan.clutter = scene.clutter;

@@ -17,9 +17,17 @@
 
 namespace asbuilt::simulate {
 
-/// What the label of a point says. Values between kFirstThing and kLastThing number the other things of the scan.
+/// What the label of a point says. Values between kFirstThing and kLastThing number the other things of the scan,
+/// first of all further placements of the part.
 struct Label {
   static constexpr std::uint8_t kSurroundings = 0, kPart = 1, kFirstThing = 2, kLastThing = 254, kFlying = 255;
+};
+
+/// A further placement of the part in a scan; the same body as the first.
+struct OtherPlacement {
+  Pose model_from_scan = Pose::Identity();
+  std::uint8_t label = Label::kFirstThing;  ///< of its points
+  double occlusion = 1.0, hidden = 1.0;     ///< as those of the first
 };
 
 /// One scan and the truth about it.
@@ -28,9 +36,10 @@ struct SimulatedScan {
   std::vector<Eigen::Vector3f> points_in_scan;  ///< the sensor is the origin
   std::vector<std::uint8_t> labels;             ///< one a point
   std::optional<Pose> model_from_scan;          ///< takes points of the part onto the as-built mesh; empty: no part
-  double occlusion = 1.0;                       ///< 1 - visible area of the part / area of the part
-  double hidden = 1.0;                          ///< share of what an unobstructed view shows that is covered
-  double clutter = 1.0;                         ///< 1 - visible area of the part / area of the scene
+  std::vector<OtherPlacement> other_placements;
+  double occlusion = 1.0;  ///< 1 - visible area of the part / area of the part
+  double hidden = 1.0;     ///< share of what an unobstructed view shows that is covered
+  double clutter = 1.0;    ///< 1 - visible area of the part / area of the scene
 };
 
 struct Simulation {
@@ -45,10 +54,10 @@ struct Simulation {
 [[nodiscard]] NoiseModel noise_model(const SimulateOptions& options, double diameter_mm);
 
 /// Simulates scans of a part in scenes that are new for each scan. The same for a seed, whatever the thread count.
-/// `companions` are meshes that stand in every scan in addition to the random things, as far as there is room (a part of
-/// the same family, say); in a scan without the part, the first of them takes its place.
-/// Source: Sec. 4 (data), occlusion and clutter as defined there. Cost: about a second for a scan of 100 000 points.
-/// Errors: invalid_argument from validate(); not_possible for a model without area; cancelled.
+/// `companions` are meshes that stand in every scan in addition to the random things, as far as there is room (a part
+/// of the same family, say); in a scan without the part, the first of them takes its place. Source: Sec. 4 (data),
+/// occlusion and clutter as defined there. Cost: about a second for a scan of 100 000 points. Errors: invalid_argument
+/// from validate(); not_possible for a model without area; cancelled.
 [[nodiscard]] Result<Simulation> simulate(const TriangleMesh& cad, const SimulateOptions& options,
                                           const Context& context, std::span<const TriangleMesh> companions = {});
 

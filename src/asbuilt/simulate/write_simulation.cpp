@@ -27,12 +27,19 @@ Json matrix(const std::optional<Pose>& pose) {
 }
 
 Json truth_of(const SimulatedScan& scan) {
-  return {{"path", scan.name + ".ply"},
-          {"labels", scan.name + ".labels"},
-          {"model_from_scan", matrix(scan.model_from_scan)},
-          {"occlusion", scan.occlusion},
-          {"hidden", scan.hidden},
-          {"clutter", scan.clutter}};
+  Json truth{{"path", scan.name + ".ply"},
+             {"labels", scan.name + ".labels"},
+             {"model_from_scan", matrix(scan.model_from_scan)},
+             {"occlusion", scan.occlusion},
+             {"hidden", scan.hidden},
+             {"clutter", scan.clutter}};
+  for (const OtherPlacement& other : scan.other_placements) {
+    truth["other_placements"].push_back({{"model_from_scan", matrix(other.model_from_scan)},
+                                         {"label", other.label},
+                                         {"occlusion", other.occlusion},
+                                         {"hidden", other.hidden}});
+  }
+  return truth;
 }
 
 Result<void> write_points(const std::filesystem::path& path, const std::vector<Eigen::Vector3f>& points) {

@@ -39,14 +39,17 @@ struct Candidate {
   double normal_agreement = 0.0;       ///< share of scan points on the model whose normals agree
   double rms_mm = 0.0;                 ///< of the inliers' distances to the model
   double residual_ratio = 0.0;         ///< rms_mm / score distance: 0.58 for points strewn evenly across the band
+  double facing_share = 0.0;           ///< of all samples, those that ought to be visible: turned to the sensor, free
   double hidden_share = 0.0;           ///< share of the samples turned to the sensor that something stands in front of
+  double found_share = 0.0;            ///< of the others, those that the scan confirms ...
+  double missing_share = 0.0;          ///< ... and those where it has no return; the rest is contradiction_share
   double support = 0.0;  ///< (evidence for - weighted evidence against) / all samples: candidates compete by it
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
   double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
-  double slip_lead =
-      0.0;  ///< measurements by which it leads over any small slip; asked where the surface alone is loose
+  double slip_lead = 0.0;      ///< measurements by which it leads over any small slip; asked where the surface is loose
   double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;   ///< model samples that the scan confirms
+  Reason objection = Reason::none;  ///< what stands against it on its own, whatever its rivals
 };
 
 enum class Status { accepted, ambiguous, rejected };

@@ -77,6 +77,7 @@ class Judge {
     const double cosine = normal.dot(towards);
     if (cosine < kGrazing || is_behind_part(point_in_model, normal_in_model, towards)) return;
     sum.facing += cosine;
+    ++sum.facing_samples;
     if (is_there) {
       sum.explained += cosine;
       ++sum.explained_samples;

@@ -35,6 +35,7 @@ struct PoseEvidence {
   std::size_t samples = 0;             ///< all model samples asked
   std::size_t explained_anywhere = 0;  ///< of all samples, visible or not: Eq. 11 to the letter
   std::size_t explained_samples = 0;   ///< of those that ought to be visible
+  std::size_t facing_samples = 0;      ///< those that ought to be visible, or would be but for other things
   double facing = 0.0;                 ///< turned to the sensor and not behind the part itself
   double explained = 0.0;              ///< the scan has a surface there (Eq. 11's condition, across the surface)
   double hidden = 0.0;                 ///< something stands in front: neutral

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::verify {
@@ -20,8 +21,8 @@ struct Candidate {
 // Points around the model, told apart by their distance to the CAD and their normal. `beyond` is one more reach wide:
 // enough to see whether a surface goes on.
 std::vector<Candidate> candidates(const Pose& model_from_scan, const model::PreparedModel& model,
-                                  const ScanEvidence& scan, const KdTree& tree, const SegmentOptions& options,
-                                  const Context& context) {
+                                  const scan::Scan& scan, const std::vector<std::uint8_t>& background,
+                                  const KdTree& tree, const SegmentOptions& options, const Context& context) {
   const Eigen::Vector3d centre = model_from_scan.inverse() * model.box.center().eval();
   std::vector<KdTree::Neighbour> around;
   tree.within(centre.cast<float>(), static_cast<float>(0.5 * model.diameter + 2.0 * options.reach_mm), around);
@@ -30,13 +31,13 @@ std::vector<Candidate> candidates(const Pose& model_from_scan, const model::Prep
   constexpr std::uint32_t kOutside = std::numeric_limits<std::uint32_t>::max();
   parallel_for(context, around.size(), 512, [&](std::size_t i) {
     const std::uint32_t index = around[i].index;
-    const Eigen::Vector3d point = model_from_scan * scan.scan.cloud.positions[index].cast<double>();
+    const Eigen::Vector3d point = model_from_scan * scan.cloud.positions[index].cast<double>();
     const auto nearest = model.surface->nearest(point, 2.0 * options.reach_mm);
     found[i] = {nearest.found() ? index : kOutside, Kind::beyond};
-    if (!nearest.found() || scan.background[index] != 0) return;
+    if (!nearest.found() || background[index] != 0) return;
     const Eigen::Vector3d model_normal = model.face_normals[nearest.triangle].cast<double>();
-    const double cosine = model_normal.dot(model_from_scan.linear() * scan.scan.cloud.normals[index].cast<double>());
-    const bool agrees = (scan.scan.normals_oriented ? cosine : std::abs(cosine)) >= min_cosine;
+    const double cosine = model_normal.dot(model_from_scan.linear() * scan.cloud.normals[index].cast<double>());
+    const bool agrees = (scan.normals_oriented ? cosine : std::abs(cosine)) >= min_cosine;
     const double distance = std::abs(nearest.signed_distance);
     if (distance <= options.band_mm && agrees) {
       found[i].kind = Kind::certain;
@@ -54,21 +55,21 @@ struct Surfaces {
   std::vector<std::size_t> certain_contacts, beyond_members, members;
 };
 
-Surfaces connected_surfaces(const std::vector<Candidate>& all, const ScanEvidence& scan, const KdTree& tree,
+Surfaces connected_surfaces(const std::vector<Candidate>& all, const scan::Scan& scan, const KdTree& tree,
                             const Context& context) {
   constexpr std::size_t kNeighbours = 9;
   constexpr float kLinkInSpacings = 3.0F;
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> candidate_of(scan.scan.cloud.size(), kNone);
+  std::vector<std::uint32_t> candidate_of(scan.cloud.size(), kNone);
   for (std::size_t i = 0; i < all.size(); ++i) candidate_of[all[i].index] = static_cast<std::uint32_t>(i);
 
   std::vector<std::vector<std::uint32_t>> links(all.size());
-  const float reach = kLinkInSpacings * static_cast<float>(scan.scan.spacing_mm);
+  const float reach = kLinkInSpacings * static_cast<float>(scan.spacing_mm);
   parallel_for_blocks(context, all.size(), 512, [&](std::size_t begin, std::size_t end) {
     std::vector<KdTree::Neighbour> neighbours;
     for (std::size_t i = begin; i < end; ++i) {
       if (all[i].kind == Kind::certain) continue;
-      tree.nearest(scan.scan.cloud.positions[all[i].index], kNeighbours, neighbours);
+      tree.nearest(scan.cloud.positions[all[i].index], kNeighbours, neighbours);
       for (const KdTree::Neighbour& neighbour : neighbours) {
         const std::uint32_t other = candidate_of[neighbour.index];
         if (other == kNone || other == i || neighbour.squared_distance > reach * reach) continue;
@@ -99,10 +100,11 @@ Surfaces connected_surfaces(const std::vector<Candidate>& all, const ScanEvidenc
 
 }  // namespace
 
-Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& model, const ScanEvidence& scan,
-                     const SegmentOptions& options, const Context& context) {
-  const KdTree tree(scan.scan.cloud.positions);
-  const std::vector<Candidate> all = candidates(model_from_scan, model, scan, tree, options, context);
+Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan,
+                     const std::vector<std::uint8_t>& background, const SegmentOptions& options,
+                     const Context& context) {
+  const KdTree tree(scan.cloud.positions);
+  const std::vector<Candidate> all = candidates(model_from_scan, model, scan, background, tree, options, context);
   Surfaces surfaces = connected_surfaces(all, scan, tree, context);
   Segment segment;
   for (std::size_t i = 0; i < all.size(); ++i) {

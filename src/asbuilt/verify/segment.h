@@ -7,7 +7,7 @@
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/pose.h"
 #include "asbuilt/model/prepared_model.h"
-#include "asbuilt/verify/evidence.h"
+#include "asbuilt/scan/scan.h"
 
 namespace asbuilt::verify {
 
@@ -23,8 +23,10 @@ struct Segment {
 };
 
 /// Cuts the part out of a scan at a pose. Certain points are those on the CAD; what departs from it is kept too, if its
-/// connected surface ends within reach (a boss, a dent, a warp). A surface that goes on beyond is clutter.
+/// connected surface ends within reach (a boss, a dent, a warp). A surface that goes on beyond is clutter. `background`
+/// marks points that are never certain, one byte a point of the scan.
 [[nodiscard]] Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& model,
-                                   const ScanEvidence& scan, const SegmentOptions& options, const Context& context);
+                                   const scan::Scan& scan, const std::vector<std::uint8_t>& background,
+                                   const SegmentOptions& options, const Context& context);
 
 }  // namespace asbuilt::verify

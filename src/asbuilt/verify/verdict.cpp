@@ -15,8 +15,9 @@ constexpr std::size_t kMostCandidates = 10;
 constexpr double kSamePose = 0.04;   // displacement / diameter up to which two candidates are one
 constexpr double kSamePlace = 0.35;  // distance of the centres / diameter from which they are two placements
 
-Eigen::Vector3d centre_in_scan(const Candidate& candidate, const model::PreparedModel& model) {
-  return candidate.model_from_scan.inverse() * model.box.center().eval();
+double distance_of_centres_mm(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
+  const Eigen::Vector3d centre = model.box.center();
+  return (a.model_from_scan.inverse() * centre - b.model_from_scan.inverse() * centre).norm();
 }
 
 // Score, normals and fit are nearly independent witnesses, so a pose that is mediocre in all three is less credible
@@ -119,13 +120,6 @@ bool is_refuted(const Candidate& c, const VerifyOptions& options) {
   }
 }
 
-// A rival must be nearly as well proven and explain a fair part of what the best one does; clutter that passes the
-// thresholds alone is not a second part beside a clear first.
-bool is_comparable(const Candidate& rival, const Candidate& best) {
-  constexpr double kProofShare = 0.75, kSupportShare = 0.25;
-  return proof(rival) >= kProofShare * proof(best) && rival.support >= kSupportShare * best.support;
-}
-
 enum class Outcome { first, second, undecided };
 
 Outcome winner(const PoseContrast& contrast, const VerifyOptions& options) {
@@ -161,10 +155,6 @@ Finding too_alike(const Candidate& best, const Candidate& rival, const std::opti
                       apart, rival.score, best.score, where_they_differ)};
 }
 
-bool is_in_same_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
-  return (centre_in_scan(a, model) - centre_in_scan(b, model)).norm() <= kSamePlace * model.diameter;
-}
-
 // Different poses in the same place that would be accepted too: what both predict supports both, so only the rest
 // counts. The one that wins there goes to the front, also against a small lead in support.
 void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedModel& model,
@@ -172,7 +162,7 @@ void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedM
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     const Candidate &best = candidates.front(), &rival = candidates[i];
     const bool is_close = best.support - rival.support < options.min_margin * best.support;
-    if (!is_close || !is_in_same_place(best, rival, model)) continue;
+    if (!is_close || !is_in_one_place(best, rival, model)) continue;
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
     if (winner(compare(best, rival), options) != Outcome::second) continue;
     std::rotate(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(i),
@@ -182,16 +172,14 @@ void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedM
 
 // A different pose that would itself be accepted and that nothing tells from the best.
 Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedModel& model,
-                const VerifyOptions& options, const Comparison& compare) {
+                const VerifyOptions& options, const Comparison& compare, bool one_of_several) {
   const Candidate& best = candidates.front();
   for (std::size_t i = 1; i < candidates.size(); ++i) {
     const Candidate& rival = candidates[i];
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
-    if (!is_in_same_place(best, rival, model)) {
-      return {
-          Reason::second_instance,
-          fmt::format("the part stands in a second place, {:.0f} mm away, with score {:.2f} beside {:.2f}",
-                      (centre_in_scan(best, model) - centre_in_scan(rival, model)).norm(), rival.score, best.score)};
+    if (!is_in_one_place(best, rival, model)) {
+      if (one_of_several) continue;
+      return {Reason::second_instance, second_instance_sentence(best, rival, model)};
     }
     std::optional<PoseContrast> contrast;
     if (compare) contrast = compare(best, rival);
@@ -279,8 +267,28 @@ std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::si
   return kept;
 }
 
+bool is_comparable(const Candidate& rival, const Candidate& best) {
+  constexpr double kProofShare = 0.75, kSupportShare = 0.25;
+  return proof(rival) >= kProofShare * proof(best) && rival.support >= kSupportShare * best.support;
+}
+
+bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
+  return distance_of_centres_mm(a, b, model) <= kSamePlace * model.diameter;
+}
+
+bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,
+                        const VerifyOptions& options) {
+  return !is_in_one_place(best, rival, model) && is_comparable(rival, best) &&
+         objection(rival, options).reason == Reason::none;
+}
+
+std::string second_instance_sentence(const Candidate& best, const Candidate& rival, const model::PreparedModel& model) {
+  return fmt::format("the part stands in a second place, {:.0f} mm away, with score {:.2f} beside {:.2f}",
+                     distance_of_centres_mm(best, rival, model), rival.score, best.score);
+}
+
 Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options,
-                 const Comparison& compare) {
+                 const Comparison& compare, bool one_of_several) {
   Detection detection;
   if (candidates.empty()) {
     detection.explanation = "no pose of the part was proposed";
@@ -288,6 +296,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   }
   detection.candidates =
       best_different(std::move(candidates), kMostCandidates, kSamePose * model.diameter, model, options);
+  for (Candidate& candidate : detection.candidates) candidate.objection = objection(candidate, options).reason;
   // A pose that the scan refutes is no rival to one that it does not; one that merely lacks proof still is.
   if (!options.paper_mode) {
     std::ranges::stable_partition(detection.candidates, [&](const Candidate& c) { return !is_refuted(c, options); });
@@ -311,7 +320,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
     detection.explanation = std::move(finding.explanation);
     return detection;
   }
-  if (!options.paper_mode) finding = rivalry(detection.candidates, model, options, compare);
+  if (!options.paper_mode) finding = rivalry(detection.candidates, model, options, compare, one_of_several);
   detection.reason = finding.reason;
   detection.status = finding.reason == Reason::none ? Status::accepted : Status::ambiguous;
   detection.explanation =

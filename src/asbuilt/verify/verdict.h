@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "asbuilt/model/prepared_model.h"
@@ -26,12 +27,28 @@ namespace asbuilt::verify {
                                                     double least_apart_mm, const model::PreparedModel& model,
                                                     const VerifyOptions& options);
 
+/// Whether a rival is nearly as well proven as the best candidate and explains a fair part of what that one does.
+/// Clutter that passes the thresholds alone is not a second part beside a clear first.
+[[nodiscard]] bool is_comparable(const Candidate& rival, const Candidate& best);
+
+/// Whether the part's centre is at about the same place in both.
+[[nodiscard]] bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model);
+
+/// Whether a rival would be a second placement of the part beside the best candidate: in another place, comparable, and
+/// nothing stands against it on its own.
+[[nodiscard]] bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,
+                                      const VerifyOptions& options);
+[[nodiscard]] std::string second_instance_sentence(const Candidate& best, const Candidate& rival,
+                                                   const model::PreparedModel& model);
+
 /// What the scan says where two candidates predict different things.
 using Comparison = std::function<PoseContrast(const Candidate& first, const Candidate& second)>;
 
 /// Decides from refined candidates: accepted, ambiguous or rejected, with the reason and the numbers. Rivals in the
-/// same place are told apart by `compare`, if it is there, else by their support alone.
+/// same place are told apart by `compare`, if it is there, else by their support alone. Rivals elsewhere make the pose
+/// ambiguous, unless it is to be `one_of_several`: then whether they are placements of their own is for the caller.
 [[nodiscard]] Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model,
-                               const VerifyOptions& options, const Comparison& compare = {});
+                               const VerifyOptions& options, const Comparison& compare = {},
+                               bool one_of_several = false);
 
 }  // namespace asbuilt::verify

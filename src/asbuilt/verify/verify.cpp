@@ -63,6 +63,11 @@ std::vector<std::uint8_t> background(const scan::Scan& scan, const model::Prepar
                                         context);
 }
 
+std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<std::uint8_t> background) {
+  for (std::size_t i = 0; i < taken.size(); ++i) background[i] |= taken[i];
+  return background;
+}
+
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
   const double d = model.sampling_distance;
   return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
@@ -121,20 +126,24 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const mod
   candidate.weakest_direction = weakest_direction(evidence, model, false);
   candidate.weakest_but_near = weakest_direction(evidence, model, true);
   const double denied = evidence.contradicted + evidence.seen_through;
-  candidate.contradiction_share =
-      evidence.facing > evidence.hidden ? denied / (evidence.facing - evidence.hidden) : 0.0;
+  const double asked = evidence.facing - evidence.hidden;
+  candidate.contradiction_share = asked > 0.0 ? denied / asked : 0.0;
+  candidate.found_share = asked > 0.0 ? evidence.explained / asked : 0.0;
+  candidate.missing_share = asked > 0.0 ? evidence.missing / asked : 0.0;
+  candidate.facing_share = static_cast<double>(evidence.facing_samples) / static_cast<double>(evidence.samples);
   candidate.support = evidence.support(contradiction_weight);
 }
 
 class Verification {
  public:
   Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
-               const Context& context)
+               const Context& context, std::span<const std::uint8_t> taken)
       : scan_(scan),
         model_(model),
         options_(options),
         context_(context),
-        evidence_(scan, background(scan, model, options, context)),
+        background_(background(scan, model, options, context)),
+        evidence_(scan, with(taken, background_)),
         final_distance_(score_distance(scan, model, options)),
         shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
         rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
@@ -218,7 +227,7 @@ class Verification {
 
   void cut_out(Detection& detection) const {
     const SegmentOptions segmentation{std::max(final_distance_, 0.0075 * model_.diameter), 0.03 * model_.diameter, 0.8};
-    Segment segment = segment_part(detection.best.model_from_scan, model_, evidence_, segmentation, context_);
+    Segment segment = segment_part(detection.best.model_from_scan, model_, scan_, background_, segmentation, context_);
     detection.segment = std::move(segment.part);
     detection.margin_points = std::move(segment.margin);
   }
@@ -268,6 +277,7 @@ class Verification {
   const model::PreparedModel& model_;
   const VerifyOptions& options_;
   const Context& context_;
+  std::vector<std::uint8_t> background_;
   ScanEvidence evidence_;
   double final_distance_;
   std::vector<Eigen::Vector3f> shuffled_foreground_;
@@ -299,7 +309,8 @@ Result<void> VerifyOptions::validate() const {
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                          std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
-                         const Context& context, bool accept_anyway) {
+                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken) {
+  ASBUILT_EXPECT(taken.empty() || taken.size() == scan.cloud.size(), "one byte a point of the scan");
   ASBUILT_CHECK(options.validate());
   std::vector<Candidate> candidates;
   for (const detect::Hypothesis& hypothesis : hypotheses) {
@@ -308,16 +319,17 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidate.votes = hypothesis.votes;
     candidates.push_back(candidate);
   }
-  const Verification verification(scan, model, options, context);
+  const Verification verification(scan, model, options, context, taken);
   candidates = verification.with_near_poses(verification.coarse_to_fine(std::move(candidates)));
   parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
     if (!context.cancelled()) verification.register_densely(candidates[i]);
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
 
-  Detection detection =
-      decide(std::move(candidates), model, options,
-             [&](const Candidate& first, const Candidate& second) { return verification.contrast_of(first, second); });
+  const auto compare = [&](const Candidate& first, const Candidate& second) {
+    return verification.contrast_of(first, second);
+  };
+  Detection detection = decide(std::move(candidates), model, options, compare, !taken.empty());
   if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
     detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
     detection.status = Status::accepted;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <span>
 
 #include "asbuilt/core/context.h"
@@ -74,8 +75,13 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
 /// Judges hypotheses, best first: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part out.
 /// A pose that the user vouches for (`--accept`, `--poses`) enters as a hypothesis; `accept_anyway` skips the verdict
 /// for the best of them and says so in the explanation.
+///
+/// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong to
+/// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the
+/// caller.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                                        std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
-                                       const Context& context, bool accept_anyway = false);
+                                       const Context& context, bool accept_anyway = false,
+                                       std::span<const std::uint8_t> taken = {});
 
 }  // namespace asbuilt::verify

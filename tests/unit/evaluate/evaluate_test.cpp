@@ -144,6 +144,63 @@ TEST(Evaluate, NothingAcceptedHasNoRatio) {
   EXPECT_TRUE(nlohmann::json::parse(to_json(evaluation))["ratio_to_oracle"].is_null());
 }
 
+// A second placement in the first scan that shows the part: in the truth, and in the result if it was looked for.
+struct TwoPlacements : Scenario {
+  Pose second_pose;
+  std::size_t index = first_present();
+
+  explicit TwoPlacements(const std::string& name) : Scenario(name) {
+    second_pose = Pose(Eigen::Translation3d(300, 0, 0)) * *simulation.scans[index].model_from_scan;
+    simulation.scans[index].other_placements.push_back({second_pose, 2, 0.5, 0.1});
+    EXPECT_TRUE(simulate::write_simulation(folder, simulation).has_value());
+  }
+  void find_all() {
+    record.options.emplace_back("instances", std::string("all"));
+    io::ScanRecord entry = record.scans[index];
+    entry.instance = 2;
+    entry.model_from_scan = second_pose;
+    record.scans.insert(record.scans.begin() + static_cast<std::ptrdiff_t>(index) + 1, entry);
+  }
+};
+
+TEST(Evaluate, EitherOfTwoPlacementsIsRightWhenOneIsWanted) {
+  TwoPlacements scenario("one_of_two");
+  EXPECT_EQ(scenario.evaluated()->present, 3U);
+  EXPECT_EQ(scenario.evaluated()->right, 3U);
+  scenario.record.scans[scenario.index].model_from_scan = scenario.second_pose;
+  const Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.right, 3U);
+  EXPECT_EQ(evaluation.wrong, 0U);
+  EXPECT_DOUBLE_EQ(evaluation.per_scan[scenario.index].hidden, 0.1);
+}
+
+TEST(Evaluate, EveryPlacementCountsWhenAllAreWanted) {
+  TwoPlacements scenario("two_of_two");
+  scenario.find_all();
+  Evaluation evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.scans, 4U);
+  EXPECT_EQ(evaluation.present, 4U);
+  EXPECT_EQ(evaluation.right, 4U);
+  EXPECT_EQ(evaluation.per_scan[scenario.index + 1].name, evaluation.per_scan[scenario.index].name + "#2");
+
+  // In another order they are the same two.
+  std::swap(scenario.record.scans[scenario.index].model_from_scan,
+            scenario.record.scans[scenario.index + 1].model_from_scan);
+  EXPECT_EQ(scenario.evaluated()->right, 4U);
+
+  // One of them missing lowers recall; the same one twice is wrong.
+  scenario.record.scans[scenario.index].model_from_scan = scenario.record.scans[scenario.index + 1].model_from_scan;
+  evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.right, 3U);
+  EXPECT_EQ(evaluation.wrong, 1U);
+  scenario.record.scans.erase(scenario.record.scans.begin() + static_cast<std::ptrdiff_t>(scenario.index) + 1);
+  evaluation = scenario.evaluated().value();
+  EXPECT_EQ(evaluation.present, 4U);
+  EXPECT_EQ(evaluation.right, 3U);
+  EXPECT_EQ(evaluation.wrong, 0U);
+  EXPECT_EQ(evaluation.per_scan[scenario.index + 1].status, "missing");
+}
+
 TEST(Evaluate, SegmentsAreJudgedPointByPoint) {
   Scenario scenario("segments");
   const std::size_t index = scenario.first_present();

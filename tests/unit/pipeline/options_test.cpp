@@ -24,6 +24,7 @@ TEST(Options, ComeBackFromTheRecord) {
   options.exclude = {"scan_01"};
   options.seed = 42;
   options.gauge = Gauge::fixed;
+  options.instances = Instances::all;
   options.detect.angle_bins = 17;
   options.scan.use_file_normals = false;
   options.graph.edges.low = 0.123;
@@ -33,6 +34,7 @@ TEST(Options, ComeBackFromTheRecord) {
   ASSERT_TRUE(take_over(back, record).has_value());
   EXPECT_EQ(recorded(back, everything), record);
   EXPECT_EQ(back.scan_unit, io::Unit::metre);
+  EXPECT_EQ(back.instances, Instances::all);
   EXPECT_EQ(back.detect.angle_bins, 17);
   EXPECT_FALSE(back.scan.use_file_normals);
   EXPECT_EQ(back.graph.edges.low, 0.123);
@@ -42,6 +44,7 @@ TEST(Options, OfTheWrongKindAreRefused) {
   Options options;
   EXPECT_FALSE(take_over(options, {{"angle_bins", std::string("many")}}).has_value());
   EXPECT_FALSE(take_over(options, {{"unit", std::string("parsec")}}).has_value());
+  EXPECT_FALSE(take_over(options, {{"instances", std::string("some")}}).has_value());
 }
 
 TEST(Acceptance, IsAScanAndACandidate) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 namespace asbuilt::io {
@@ -35,6 +36,12 @@ RunRecord example() {
   scan.component = 0;
   scan.score = 0.1 + 0.2;
   scan.candidates.push_back({});
+  scan.candidates.push_back({});
+  scan.candidates[1].facing_share = 0.3, scan.candidates[1].found_share = 0.25, scan.candidates[1].missing_share = 0.5;
+  scan.candidates[1].contradiction_share = 0.25, scan.candidates[1].residual_ratio = 0.2;
+  scan.candidates[1].weakest_direction = 0.01, scan.candidates[1].slip_lead = -3.5;
+  scan.candidates[1].overrun_share = 0.125, scan.candidates[1].objection = "low_score";
+  scan.instance = 2, scan.instances_in_scan = 3;
   scan.segment_points = 5;
   scan.warnings = {"one"};
   record.scans = {scan, ScanRecord{}};
@@ -52,6 +59,24 @@ TEST(RunRecord, ComesBackExactlyAsItWasWritten) {
   EXPECT_EQ(back->scans[0].model_from_scan->matrix(), example().scans[0].model_from_scan->matrix());
   EXPECT_EQ(back->scans[0].score, 0.1 + 0.2);
   EXPECT_EQ(back->options, example().options);
+}
+
+TEST(RunRecord, OfAnEarlierVersionIsReadWithoutTheFieldsThatCameLater) {
+  std::string text = to_json(example());
+  for (const char* later :
+       {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share", "missing_share",
+        "residual_ratio", "weakest_direction", "slip_lead", "overrun_share", "objection"}) {
+    const std::string key = std::string("\"") + later + "\":";
+    for (auto at = text.find(key); at != std::string::npos; at = text.find(key)) text.replace(at, key.size(), "\"x\":");
+  }
+  const auto back = run_record_from_json(text, "test");
+  ASSERT_TRUE(back.has_value()) << back.error().message;
+  EXPECT_EQ(back->scans[0].instance, 1);
+  EXPECT_EQ(back->scans[0].instances_in_scan, 1);
+  EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].found_share));
+  EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].slip_lead));
+  EXPECT_TRUE(std::isnan(back->scans[0].candidates[1].overrun_share));
+  EXPECT_EQ(back->scans[0].candidates[1].objection, "");
 }
 
 TEST(RunRecord, HasTheKeysOfTheContractInItsOrder) {

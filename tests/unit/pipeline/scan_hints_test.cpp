@@ -41,5 +41,22 @@ TEST(Viewpoints, OfATableBelongToTheScansItNames) {
   EXPECT_TRUE(viewpoints->of("x/c.ply", "c").automatic);
 }
 
+TEST(EntryNames, TellThePlacementsOfAScanApart) {
+  EXPECT_EQ(entry_name("scan", 1), "scan");
+  EXPECT_EQ(entry_name("scan", 2), "scan#2");
+  io::ScanRecord first, second;
+  first.path = second.path = "folder/scan.ply";
+  first.name = "scan", second.name = "scan#2", second.instance = 2;
+  for (const char* of_both : {"scan", "folder/scan.ply", "scan.ply"}) {
+    EXPECT_TRUE(names_entry(of_both, first)) << of_both;
+    EXPECT_TRUE(names_entry(of_both, second)) << of_both;
+  }
+  EXPECT_TRUE(names_entry("scan#1", first));
+  EXPECT_FALSE(names_entry("scan#1", second));
+  EXPECT_TRUE(names_entry("scan#2", second));
+  EXPECT_FALSE(names_entry("scan#2", first));
+  EXPECT_FALSE(names_entry("sca", second));
+}
+
 }  // namespace
 }  // namespace asbuilt::pipeline

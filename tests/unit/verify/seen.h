@@ -36,6 +36,13 @@ inline Pose pose_at(const Eigen::Vector3d& where, const Eigen::Vector3d& turn = 
   return pose;
 }
 
+/// A box's corner (+, +, +) straight ahead, so that three of its faces are seen.
+inline Pose corner_ahead(double distance_mm) {
+  Pose pose(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::Ones(), -Eigen::Vector3d::UnitZ()));
+  pose.translation() = Eigen::Vector3d(0, 0, distance_mm);
+  return pose;
+}
+
 inline TriangleMesh plate_at(const Eigen::Vector3d& size, const Eigen::Vector3d& where) {
   return simulate::transformed(simulate::box(size), Pose(Eigen::Translation3d(where)));
 }

@@ -108,6 +108,27 @@ TEST(Verdict, OnASecondInstanceIsAmbiguous) {
   EXPECT_EQ(detection.candidates.size(), 2U);
 }
 
+TEST(Verdict, KnowsASecondPlacementFromClutterAndFromAnotherPoseInThePlace) {
+  const Candidate best = flawless();
+  EXPECT_TRUE(is_second_instance(best, flawless({300, 0, 600}), block(), {}));
+  EXPECT_FALSE(is_second_instance(best, flawless({5, 0, 600}), block(), {})) << "in the same place";
+  Candidate rejected = flawless({300, 0, 600});
+  rejected.score = 0.5;
+  EXPECT_FALSE(is_second_instance(best, rejected, block(), {}));
+  Candidate small = flawless({300, 0, 600});
+  small.support = 0.2 * best.support;
+  EXPECT_FALSE(is_second_instance(best, small, block(), {})) << "explains too little beside the best";
+}
+
+TEST(Verdict, TellsOfEveryCandidateWhatStandsAgainstIt) {
+  Candidate loser = flawless({300, 0, 600});
+  loser.support = 0.1, loser.score = 0.3;
+  const Detection detection = decide({flawless(), loser}, block(), {});
+  ASSERT_EQ(detection.candidates.size(), 2U);
+  EXPECT_EQ(detection.candidates[0].objection, Reason::none);
+  EXPECT_EQ(detection.candidates[1].objection, Reason::low_score);
+}
+
 TEST(Verdict, OnTwoPosesInOnePlaceIsAmbiguousIfTheyAreAboutEquallySupported) {
   Candidate turned = flawless();
   const Eigen::Translation3d centre(Eigen::Vector3d(bounding_box(block().skin).center()));

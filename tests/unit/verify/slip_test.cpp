@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/slip.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "asbuilt/verify/near_poses.h"
+#include "asbuilt/verify/verdict.h"
+#include "asbuilt/verify/verify.h"
+#include "unit/verify/seen.h"
+
+namespace asbuilt::verify {
+namespace {
+
+/// A part in a scan, asked at its true pose.
+struct Asked {
+  Asked(const TriangleMesh& mesh, const Pose& scan_from_model, std::vector<TriangleMesh> others, double half_width)
+      : model(test::prepared(mesh)), model_from_scan(scan_from_model.inverse()) {
+    others.push_back(simulate::transformed(mesh, scan_from_model));
+    scan = test::seen(others, half_width);
+    const double distance_mm = 0.5 * scan.spacing_mm + 0.005 * model.diameter;
+    options = {distance_mm, std::max(distance_mm, 2.5 * scan.spacing_mm)};
+    seen = std::make_unique<ScanEvidence>(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+    evidence = evidence_for(model_from_scan, model.dense_samples, model, *seen, options);
+  }
+  [[nodiscard]] double lead() const {
+    return least_lead_over_slips(model_from_scan, evidence, model, 0.03 * model.diameter, *seen, options);
+  }
+  [[nodiscard]] double weakest() const { return weakest_direction(evidence, model, false); }
+
+  model::PreparedModel model;
+  Pose model_from_scan;
+  scan::Scan scan;
+  EvidenceOptions options;
+  std::unique_ptr<ScanEvidence> seen;
+  PoseEvidence evidence;
+};
+
+const Eigen::Vector3d kBrick(100, 80, 60);
+const VerifyOptions kLimits;
+
+TEST(Slip, PosesMoveTheBoxByTheGivenWayBothWays) {
+  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
+  const auto slipped = slipped_poses(brick.model_from_scan, brick.evidence, brick.model, 4.0);
+  ASSERT_EQ(slipped.size(), 6U);
+  for (const Pose& pose : slipped) EXPECT_NEAR(displacement_mm(pose, brick.model_from_scan, brick.model), 4.0, 0.1);
+  for (std::size_t i = 0; i < slipped.size(); i += 2) {
+    EXPECT_NEAR(displacement_mm(slipped[i], slipped[i + 1], brick.model), 8.0, 0.2);
+  }
+}
+
+TEST(Slip, ABoxThatShowsThreeFacesIsHeldByThem) {
+  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
+  EXPECT_GT(brick.weakest(), kLimits.min_weakest_direction);
+  EXPECT_GT(brick.lead(), kLimits.min_contrast);
+}
+
+// The field of view ends on the face, so that nothing but a plane is seen.
+TEST(Slip, AFaceWithoutItsEdgesHoldsNothing) {
+  const Asked slab(simulate::box({400, 400, 40}), Pose(Eigen::Translation3d(0, 0, 500)), {}, 0.25);
+  EXPECT_LT(slab.weakest(), kLimits.min_weakest_direction);
+  EXPECT_LE(slab.lead(), 0.0);
+}
+
+// A long beam, two faces of it turned to the sensor, its ends square to the view: they return nothing, but the wall
+// behind shows where the beam stops. Along it the surface says nothing.
+Pose beam_from_above() {
+  Pose pose(Eigen::AngleAxisd(0.785, Eigen::Vector3d::UnitX()));
+  pose.translation() = Eigen::Vector3d(0, 0, 700);
+  return pose;
+}
+TriangleMesh beam(double length) { return simulate::box({length, 40, 30}); }
+
+TEST(Slip, ABeamWhoseEndsAreSeenAsSilhouettesIsHeldByThem) {
+  const Asked seen(beam(300), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
+  EXPECT_LT(seen.weakest(), kLimits.min_weakest_direction);
+  EXPECT_GT(seen.lead(), kLimits.min_contrast);
+}
+
+TEST(Slip, ABeamThatReachesOutOfTheFieldOfViewIsNot) {
+  const Asked seen(beam(1000), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
+  EXPECT_LT(seen.weakest(), kLimits.min_weakest_direction);
+  EXPECT_LT(seen.lead(), kLimits.min_contrast);
+}
+
+}  // namespace
+}  // namespace asbuilt::verify
