@@ -30,16 +30,16 @@ bool in_paper_mode(const io::RunRecord& record) {
 
 /// " (at most 8 % allowed)", or nothing where no limit is known.
 std::string limit(const io::RunRecord& record, std::string_view option, std::string_view words, double factor,
-                  int digits, std::string_view unit) {
+                  std::string_view unit) {
   const auto value = option_of(record, option);
-  return value ? fmt::format(" ({} {:.{}f}{})", words, factor * *value, digits, unit) : std::string();
+  return value ? fmt::format(" ({} {:.3g}{})", words, factor * *value, unit) : std::string();
 }
 
 std::string percent_needed(const io::RunRecord& record, std::string_view option) {
-  return limit(record, option, "needed:", 100.0, 0, " %");
+  return limit(record, option, "needed:", 100.0, " %");
 }
 std::string percent_allowed(const io::RunRecord& record, std::string_view option) {
-  return limit(record, option, "allowed:", 100.0, 0, " %");
+  return limit(record, option, "allowed:", 100.0, " %");
 }
 
 std::string words_of(const std::string& objection) {
@@ -98,20 +98,25 @@ std::string surface_sentences(const io::RunRecord& record, const io::CandidateRe
 
 std::string quality_sentences(const io::RunRecord& record, const io::CandidateRecord& best) {
   std::string text =
-      fmt::format("  Score: {:.2f}{}.\n", best.score, limit(record, "acceptance_score", "needed:", 1.0, 2, ""));
+      fmt::format("  Score: {:.2f}{}.\n", best.score, limit(record, "acceptance_score", "needed:", 1.0, ""));
   text += fmt::format("  Normals: {:.0f} % of those of the scan on the model agree with it{}.\n",
                       100.0 * best.normal_agreement, percent_needed(record, "min_normal_agreement"));
   text += fmt::format("  Scatter: the points on the model lie {:.3g} mm (RMS) off it", best.rms);
   if (std::isnan(best.residual_ratio)) return text + ".\n";
   text += fmt::format(", {:.2f} of the distance that counts as on it{}; 0.58 would be no fit at all.\n",
-                      best.residual_ratio, limit(record, "max_residual_ratio", "allowed:", 1.0, 2, ""));
+                      best.residual_ratio, limit(record, "max_residual_ratio", "allowed:", 1.0, ""));
   text += fmt::format(
       "  Hold: {:.4f}{} in the direction in which the surface that was found lets the part slide or turn most easily; "
       "0 would be free",
-      best.weakest_direction, limit(record, "min_weakest_direction", "needed:", 1.0, 4, ""));
-  if (std::isnan(best.slip_lead)) return text + ".\n";
-  text += fmt::format("; or by its edges: {:.0f} measurements more than for the slip that comes closest{}.\n",
-                      best.slip_lead, limit(record, "min_contrast", "needed:", 1.0, 0, ""));
+      best.weakest_direction, limit(record, "min_weakest_direction", "needed:", 1.0, ""));
+  const auto firm = option_of(record, "min_weakest_direction");
+  // Edges are asked only where the surface alone is loose.
+  if (!std::isnan(best.slip_lead) && firm && best.weakest_direction < *firm) {
+    text += fmt::format("; its edges: {:.0f} measurements more than for the slip that comes closest{}", best.slip_lead,
+                        limit(record, "min_contrast", "needed: at least", 1.0, ""));
+  }
+  text += ".\n";
+  if (std::isnan(best.overrun_share)) return text;
   text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
                       percent_allowed(record, "max_overrun_share"));
   return text;
@@ -137,7 +142,7 @@ std::string evidence_sentences(const io::RunRecord& record, const io::ScanRecord
     return fmt::format(
         "  Score: {:.2f}{}, the share of the model's whole surface that was found (Eq. 11).\n"
         "  Normals: {:.0f} % agree{}.\n",
-        best.score, limit(record, "acceptance_score", "needed:", 1.0, 2, ""), 100.0 * best.normal_agreement,
+        best.score, limit(record, "acceptance_score", "needed:", 1.0, ""), 100.0 * best.normal_agreement,
         percent_needed(record, "min_normal_agreement"));
   }
   return surface_sentences(record, best) + quality_sentences(record, best);
@@ -159,7 +164,7 @@ std::string runner_up_sentence(const io::RunRecord& record, const io::ScanRecord
       other, angle_deg, moved_mm, next.support, best.support);
   if (next.objection.empty() && best.support > 0.0) {
     text += fmt::format(", a margin of {:.0f} %", 100.0 * (best.support - next.support) / best.support);
-    text += limit(record, "min_margin", "needed in one place:", 100.0, 0, " %");
+    text += limit(record, "min_margin", "needed in one place:", 100.0, " %");
   }
   return text + fmt::format("; {}.\n", words_of(next.objection));
 }

@@ -77,7 +77,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   }
   if (!options.paper_mode && c.contradiction_share > options.max_contradiction_share) {
     return {Reason::contradicted,
-            fmt::format("the scan denies {:.0f} % of the claimed surface, at most {:.0f} % are allowed",
+            fmt::format("the scan denies {:.1f} % of the claimed surface, at most {:.1f} % are allowed",
                         100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
   }
   if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
