@@ -107,8 +107,8 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   return {};
 }
 
-bool is_refuted(const Candidate& c, const VerifyOptions& options) {
-  switch (objection(c, options).reason) {
+bool refutes(Reason objection) {
+  switch (objection) {
     case Reason::low_score:
     case Reason::free_space_violated:
     case Reason::contradicted:
@@ -299,9 +299,9 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   for (Candidate& candidate : detection.candidates) candidate.objection = objection(candidate, options).reason;
   // A pose that the scan refutes is no rival to one that it does not; one that merely lacks proof still is.
   if (!options.paper_mode) {
-    std::ranges::stable_partition(detection.candidates, [&](const Candidate& c) { return !is_refuted(c, options); });
+    std::ranges::stable_partition(detection.candidates, [](const Candidate& c) { return !refutes(c.objection); });
   }
-  const bool is_good = objection(detection.candidates.front(), options).reason == Reason::none;
+  const bool is_good = detection.candidates.front().objection == Reason::none;
   if (is_good && compare && !options.paper_mode) put_winner_first(detection.candidates, model, options, compare);
   detection.best = detection.candidates.front();
   detection.margin = detection.best.support - (detection.candidates.size() > 1 ? detection.candidates[1].support : 0.0);
