@@ -39,6 +39,15 @@ void note_failure(CaseRecord& record, const char* code, std::string reason) {
   record.reason = std::move(reason);
 }
 
+// Whether the judge would have accepted the part, had detection proposed the truth.
+Result<std::string> verdict_on(const Pose& true_model_from_scan, const scan::Scan& scan,
+                               const model::PreparedModel& model, const verify::VerifyOptions& options,
+                               const Context& context) {
+  const std::vector<detect::Hypothesis> truth{{true_model_from_scan, 1.0}};
+  ASBUILT_TRY(detection, verify::verify(scan, model, truth, options, context));
+  return detection.status == verify::Status::accepted ? "accepted" : std::string(verify::code_of(detection.reason));
+}
+
 }  // namespace
 
 Result<PreparedPart> prepared(const SuitePart& part, const pipeline::Options& options, const Context& context) {
@@ -77,6 +86,10 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
     record.best.score = detection->best.score;
   }
 
+  if (record.present() && !record.found() && scan_of_case.model_from_scan) {
+    ASBUILT_TRY(verdict, verdict_on(*scan_of_case.model_from_scan, *scan, prepared.model, options.verify, context));
+    record.verdict_on_truth = std::move(verdict);
+  }
   record.hypotheses = hypotheses.size();
   if (hypotheses.empty()) return {};
   std::vector<Pose> poses;

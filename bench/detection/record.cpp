@@ -65,6 +65,7 @@ void for_each_field(Record& record, Visitor&& field) {
   field("explained_samples", record.explained_samples);
   field("hypotheses", record.hypotheses);
   field("right_rank", record.right_rank);
+  field("verdict_on_truth", record.verdict_on_truth);
   field("prepare_model", record.prepare_model);
   field("prepare_scan", record.prepare_scan);
   field("detect", record.detect);

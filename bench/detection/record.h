@@ -61,6 +61,9 @@ struct CaseRecord {
   int explained_samples = 0;
   std::size_t hypotheses = 0;
   std::optional<std::size_t> right_rank;  ///< of the first hypothesis near the truth, before verification, from 0
+  /// For a part that was not found: what verification says of the true pose alone, "accepted" or its reason's code. So
+  /// one knows whether detection or verification missed it. Empty for all others.
+  std::string verdict_on_truth;
   StepTime prepare_model;                 ///< once for all scans of the part
   StepTime prepare_scan, detect, verify;
 
