@@ -21,13 +21,13 @@ std::uint16_t fraction_of_turn(float angle) {
 
 // A sample counts as seen when nothing stands before it within the part; the ray starts a little off the surface
 // because samples of a faceted skin can lie a hair below it.
-std::vector<ViewMask> view_masks(const model::PreparedModel& model, const Context& context) {
+std::vector<ViewMask> view_masks(const PointCloud& samples, const model::PreparedModel& model, const Context& context) {
   constexpr float kGrazing = 0.1F;
   const double lift = 0.02 * model.sampling_distance;
-  std::vector<ViewMask> masks(model.samples.size());
+  std::vector<ViewMask> masks(samples.size());
   parallel_for(context, masks.size(), 16, [&](std::size_t i) {
-    const Eigen::Vector3f& normal = model.samples.normals[i];
-    const Eigen::Vector3d start = (model.samples.positions[i] + static_cast<float>(lift) * normal).cast<double>();
+    const Eigen::Vector3f& normal = samples.normals[i];
+    const Eigen::Vector3d start = (samples.positions[i] + static_cast<float>(lift) * normal).cast<double>();
     for (int view = 0; view < ViewMask::kDirections; ++view) {
       const Eigen::Vector3f& direction = ViewMask::directions()[static_cast<std::size_t>(view)];
       if (normal.dot(direction) < kGrazing) continue;
@@ -35,6 +35,19 @@ std::vector<ViewMask> view_masks(const model::PreparedModel& model, const Contex
     }
   });
   return masks;
+}
+
+// Sheets have two sides: what can be seen of a skin's samples from behind is there once more, turned round.
+void add_visible_backs(Codebook& book, const model::PreparedModel& model, const Context& context) {
+  PointCloud backs = model.samples;
+  for (Eigen::Vector3f& normal : backs.normals) normal = -normal;
+  const std::vector<ViewMask> masks = view_masks(backs, model, context);
+  for (std::size_t i = 0; i < backs.size() && book.samples.size() < kMostSamples; ++i) {
+    if (!masks[i].any()) continue;
+    book.samples.positions.push_back(backs.positions[i]);
+    book.samples.normals.push_back(backs.normals[i]);
+    book.seen_from.push_back(masks[i]);
+  }
 }
 
 double longest_pair(const PointCloud& samples, const Context& context) {
@@ -170,10 +183,13 @@ Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedMode
   book->longest_pair = longest_pair(model.samples, context);
   for (const Eigen::Vector3f& position : model.samples.positions) book->centre += position.cast<double>();
   book->centre /= static_cast<double>(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    book->frames.push_back(local_frame(model.samples.positions[i], model.samples.normals[i]));
+  if (!options.paper_mode) {
+    book->seen_from = view_masks(model.samples, model, context);
+    if (model.is_open()) add_visible_backs(*book, model, context);
   }
-  if (!options.paper_mode) book->seen_from = view_masks(model, context);
+  for (std::size_t i = 0; i < book->samples.size(); ++i) {
+    book->frames.push_back(local_frame(book->samples.positions[i], book->samples.normals[i]));
+  }
 
   book->quantisation.distance_step = static_cast<float>(options.distance_bin_ratio * model.sampling_distance);
   book->quantisation.angle_bins = options.angle_bins;
@@ -183,9 +199,10 @@ Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedMode
   if (!options.paper_mode) merge_repetitions(*book, options.alpha_bins, context);
   book->bucket_weight = bucket_weights(*book, options.bucket_weight_exponent);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while building the codebook");
-  book->largest_voting_bucket = options.paper_mode
-                                    ? static_cast<std::uint32_t>(book->entries.size())
-                                    : static_cast<std::uint32_t>(options.bucket_cap * static_cast<double>(count)) + 1;
+  book->largest_voting_bucket =
+      options.paper_mode
+          ? static_cast<std::uint32_t>(book->entries.size())
+          : static_cast<std::uint32_t>(options.bucket_cap * static_cast<double>(book->samples.size())) + 1;
   return std::shared_ptr<const Codebook>(std::move(book));
 }
 

@@ -27,6 +27,7 @@ class ViewMask {
 
   void set(int direction) { words_[word(direction)] |= bit(direction); }
   [[nodiscard]] bool test(int direction) const { return (words_[word(direction)] & bit(direction)) != 0; }
+  [[nodiscard]] bool any() const { return (words_[0] | words_[1] | words_[2]) != 0; }
   [[nodiscard]] bool meets(const ViewMask& other) const {
     return ((words_[0] & other.words_[0]) | (words_[1] & other.words_[1]) | (words_[2] & other.words_[2])) != 0;
   }
@@ -53,8 +54,8 @@ struct Codebook {
   std::vector<float> bucket_weight;         ///< p(m, alpha | f) of bin b: 1 / N_b in the paper (Eq. 8), N_b^-e here
   std::uint32_t largest_voting_bucket = 0;  ///< buckets with more entries say too little to be worth their votes
 
-  PointCloud samples;                                ///< the model's samples m
-  std::vector<Pose> frames;                          ///< local frame of each
+  PointCloud samples;        ///< the model's samples m; of an open skin also their visible backs (not in paper mode)
+  std::vector<Pose> frames;  ///< local frame of each
   std::vector<ViewMask> seen_from;                   ///< empty in paper mode
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the samples; where poses are compared
   double diameter = 0.0, longest_pair = 0.0, sampling_distance = 0.0;

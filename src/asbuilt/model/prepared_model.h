@@ -57,6 +57,9 @@ struct PreparedModel {
   SymmetryGroup symmetry;  ///< the rotations that map the part onto itself, and those that nearly do
   PreparationReport report;
   std::string source_path, source_sha256;  ///< of the file it came from, set by whoever read it; may be empty
+
+  /// Whether a sensor may see faces from behind: sheets and shells without thickness have two sides.
+  [[nodiscard]] bool is_open() const { return report.open_edges > 0; }
 };
 
 /// Triangle soup in, outer skin, even samples and search structures out (Sec. 4, first paragraph).

@@ -51,10 +51,11 @@ class Contrast {
     if (!scan_.scan.viewpoint.known()) return 1.0;
     const Eigen::Vector3d towards =
         scan_from_model.linear().transpose() * scan_.scan.viewpoint.towards_sensor(point_in_scan);
-    const double cosine = normal.cast<double>().dot(towards);
+    const double side = model_.is_open() && normal.cast<double>().dot(towards) < 0.0 ? -1.0 : 1.0;
+    const double cosine = side * normal.cast<double>().dot(towards);
     if (cosine < kGrazing) return 0.0;
     const double lift = 1e-3 * model_.diameter;
-    const Eigen::Vector3d start = point.cast<double>() + lift * normal.cast<double>();
+    const Eigen::Vector3d start = point.cast<double>() + side * lift * normal.cast<double>();
     return model_.rays->is_blocked(start, towards, lift, 2.0 * model_.diameter) ? 0.0 : cosine;
   }
 

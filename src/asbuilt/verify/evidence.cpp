@@ -74,8 +74,9 @@ class Judge {
     sum.explained_anywhere += is_there ? 1 : 0;
     const Eigen::Vector3d towards =
         scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
-    const double cosine = normal.dot(towards);
-    if (cosine < kGrazing || is_behind_part(point_in_model, normal_in_model, towards)) return;
+    const float side = model_.is_open() && normal.dot(towards) < 0.0 ? -1.0F : 1.0F;  // of a sheet, that it may see
+    const double cosine = static_cast<double>(side) * normal.dot(towards);
+    if (cosine < kGrazing || is_behind_part(point_in_model, side * normal_in_model, towards)) return;
     sum.facing += cosine;
     ++sum.facing_samples;
     if (is_there) {
@@ -242,7 +243,7 @@ std::optional<double> flat_normal_agreement(const Pose& model_from_scan,
     const Eigen::Vector3f fitted = rotation * scan::fit_plane(cloud.positions, neighbours).normal;
     const float turn = fitted.dot(own_normal) < 0.0F ? -1.0F : 1.0F;
     // The sheets of an open skin may be seen from behind.
-    const bool sign_counts = scan.scan.normals_oriented && model.report.open_edges == 0 &&
+    const bool sign_counts = scan.scan.normals_oriented && !model.is_open() &&
                              !is_thin(in_model, sample, static_cast<float>(options.distance_mm), model);
     const auto agrees = [&](float cosine) { return (sign_counts ? cosine : std::abs(cosine)) >= min_cosine; };
     ++asked;

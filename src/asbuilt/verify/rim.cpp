@@ -39,23 +39,28 @@ std::vector<RimProbe> rim_probes(const model::PreparedModel& model, double reach
       const Eigen::Vector3f along = static_cast<float>(std::cos(angle)) * u + static_cast<float>(std::sin(angle)) * v;
       const Eigen::Vector3f beyond = point + static_cast<float>(reach_mm) * along;
       const auto there = static_cast<double>(model.field->at(beyond).distance);
-      if (there >= kAway * reach_mm) probes.push_back({point, normal, beyond});  // unknown is infinitely far
+      if (there >= kAway * reach_mm)
+        probes.push_back({point, normal, beyond, model.is_open()});  // unknown is infinitely far
     }
   }
   return probes;
 }
 
-RimEvidence rim_evidence(const Pose& model_from_scan, const std::vector<RimProbe>& probes, double reach_mm,
+RimEvidence rim_evidence(const Pose& model_from_scan, std::span<const RimProbe> probes, double reach_mm,
                          const ScanEvidence& scan, const EvidenceOptions& options) {
   const Pose scan_from_model = model_from_scan.inverse();
   const double lateral = std::min(options.lateral_mm, kLateral * reach_mm);
   RimEvidence evidence;
   for (const RimProbe& probe : probes) {
-    const Eigen::Vector3d normal = scan_from_model.linear() * probe.normal.cast<double>();
+    Eigen::Vector3d normal = scan_from_model.linear() * probe.normal.cast<double>();
     const Eigen::Vector3d on_face = scan_from_model * probe.on_face.cast<double>();
     const Eigen::Vector3d beyond = scan_from_model * probe.beyond.cast<double>();
     const scan::Viewpoint& viewpoint = scan.scan.viewpoint;
-    if (viewpoint.known() && normal.dot(viewpoint.towards_sensor(beyond)) < kGrazing) continue;
+    if (viewpoint.known()) {
+      const Eigen::Vector3d towards = viewpoint.towards_sensor(beyond);
+      if (probe.two_sided && normal.dot(towards) < 0.0) normal = -normal;
+      if (normal.dot(towards) < kGrazing) continue;
+    }
     if (!has_plane(on_face, normal, lateral, options.distance_mm, scan)) continue;
     const bool goes_on = has_plane(beyond, normal, lateral, options.distance_mm, scan);
     if (!goes_on && scan.depth &&

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "asbuilt/core/pose.h"
@@ -16,6 +17,7 @@ struct RimProbe {
   Eigen::Vector3f on_face;  ///< a sample of the face, near its edge
   Eigen::Vector3f normal;   ///< of the face
   Eigen::Vector3f beyond;   ///< `reach_mm` away along the face, where the model has no surface any more
+  bool two_sided = false;   ///< the face belongs to an open skin and may be seen from behind
 };
 
 /// Probes around the first `most_samples` of the model's dense samples.
@@ -33,7 +35,7 @@ struct RimEvidence {
   }
 };
 
-[[nodiscard]] RimEvidence rim_evidence(const Pose& model_from_scan, const std::vector<RimProbe>& probes,
-                                       double reach_mm, const ScanEvidence& scan, const EvidenceOptions& options);
+[[nodiscard]] RimEvidence rim_evidence(const Pose& model_from_scan, std::span<const RimProbe> probes, double reach_mm,
+                                       const ScanEvidence& scan, const EvidenceOptions& options);
 
 }  // namespace asbuilt::verify

@@ -37,7 +37,7 @@ std::vector<Candidate> candidates(const Pose& model_from_scan, const model::Prep
     if (!nearest.found() || background[index] != 0) return;
     const Eigen::Vector3d model_normal = model.face_normals[nearest.triangle].cast<double>();
     const double cosine = model_normal.dot(model_from_scan.linear() * scan.cloud.normals[index].cast<double>());
-    const bool agrees = (scan.normals_oriented ? cosine : std::abs(cosine)) >= min_cosine;
+    const bool agrees = (scan.normals_oriented && !model.is_open() ? cosine : std::abs(cosine)) >= min_cosine;
     const double distance = std::abs(nearest.signed_distance);
     if (distance <= options.band_mm && agrees) {
       found[i].kind = Kind::certain;

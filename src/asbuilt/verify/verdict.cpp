@@ -27,15 +27,21 @@ double proof(const Candidate& c) {
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn);
 }
 
+// What others hide and what returned nothing can lie, so that what was found must prove the more.
+double proof_needed(const Candidate& c, const VerifyOptions& options) {
+  return options.min_proof + options.hidden_surcharge * c.hidden_share + options.missing_surcharge * c.missing_share;
+}
+
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
-// the surface does, and less may speak against it.
+// the surface does, nearly all of it must be found, and less may speak against it.
 double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
-  constexpr double kShare = 0.02;  // of the samples explained
-  return std::max(options.min_contrast, kShare * c.explained_samples);
+  constexpr double kShare = 0.012;  // of the samples explained
+  return std::max(1.25 * options.min_contrast, kShare * c.explained_samples);
 }
 
 bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
-  return c.slip_lead >= edge_measurements_needed(c, options) &&
+  constexpr double kNearlyAll = 0.9;  // of what should be visible, as a score
+  return c.score >= kNearlyAll && c.slip_lead >= edge_measurements_needed(c, options) &&
          c.contradiction_share <= 0.5 * options.max_contradiction_share;
 }
 
@@ -98,7 +104,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
                                                   100.0 * c.normal_agreement, 100.0 * options.min_normal_agreement)};
   }
-  const double needed = options.min_proof + options.hidden_surcharge * c.hidden_share;
+  const double needed = proof_needed(c, options);
   if (!options.paper_mode && proof(c) < needed) {
     return {Reason::weak_evidence,
             fmt::format("score {:.2f}, normals {:.2f} and scatter {:.2f} together prove {:.2f}, {:.2f} are needed",

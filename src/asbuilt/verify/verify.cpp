@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "asbuilt/core/option_check.h"
@@ -29,7 +30,7 @@ namespace {
 constexpr double kContradictionWeight = 3.0;
 
 // Of the diameter. A pose that could be displaced so far unnoticed is not known.
-constexpr double kSlip = 0.03;
+constexpr double kSlips[] = {0.03, 0.1};
 
 // Of the diameter: how far past its edges the part's surface must not go on.
 constexpr double kRimReach = 0.03;
@@ -47,6 +48,7 @@ struct Level {
   std::size_t survivors;     ///< candidates that reach the next level
   const PointCloud* model_samples;
   double contradiction_weight;  ///< a right pose has few contradictions, once it is precise
+  bool asks_rims;               ///< whether the surface goes on past the part's edges counts
 };
 
 double score_distance(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options) {
@@ -70,8 +72,8 @@ std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<
 
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
   const double d = model.sampling_distance;
-  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0},
-           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0},
+  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0, false},
+           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0, true},
            {0.3 * d,
             {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
             final_distance,
@@ -79,7 +81,8 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_dis
             3000,
             8,
             &model.dense_samples,
-            kContradictionWeight}}};
+            kContradictionWeight,
+            true}}};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -156,8 +159,7 @@ class Verification {
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
       });
-      candidates =
-          best_different(std::move(candidates), level.survivors, kSamePose * model_.diameter, model_, options_);
+      candidates = survivors_of(level, std::move(candidates));
     }
     return candidates;
   }
@@ -208,7 +210,7 @@ class Verification {
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
     for (const double scale : {1.5 * final_distance_, final_distance_}) {
       const LmIcpResult result =
-          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 30, !options_.paper_mode});
+          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 30, only_facing()});
       candidate.model_from_scan = result.model_from_scan;
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
@@ -217,8 +219,12 @@ class Verification {
         judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
     if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
-      candidate.slip_lead = least_lead_over_slips(candidate.model_from_scan, evidence, model_, kSlip * model_.diameter,
-                                                  evidence_, options);
+      candidate.slip_lead = std::numeric_limits<double>::infinity();
+      for (const double slip : kSlips) {
+        candidate.slip_lead =
+            std::min(candidate.slip_lead, least_lead_over_slips(candidate.model_from_scan, evidence, model_,
+                                                                slip * model_.diameter, evidence_, options));
+      }
     }
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
@@ -233,16 +239,48 @@ class Verification {
   }
 
  private:
+  // Most places go to the best by support, from which a level asks away those that lie on something larger than the
+  // part; the rest to those with most votes, as small views of the part have little support but may have many votes.
+  [[nodiscard]] std::vector<Candidate> survivors_of(const Level& level, std::vector<Candidate> candidates) const {
+    constexpr double kShareBySupport = 0.75;
+    const double apart = kSamePose * model_.diameter;
+    if (options_.paper_mode) return best_different(std::move(candidates), level.survivors, apart, model_, options_);
+    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
+    if (level.asks_rims) put_overrun_last(level, candidates);
+    if (candidates.size() <= level.survivors) return candidates;
+    const auto by_support = static_cast<std::ptrdiff_t>(kShareBySupport * static_cast<double>(level.survivors));
+    std::stable_sort(candidates.begin() + by_support, candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.votes > b.votes; });
+    candidates.resize(level.survivors);
+    return candidates;
+  }
+
+  void put_overrun_last(const Level& level, std::vector<Candidate>& candidates) const {
+    constexpr std::size_t kMostProbes = 600;
+    const auto probes = std::span(rim_probes_).first(std::min(kMostProbes, rim_probes_.size()));
+    const EvidenceOptions options{level.score_distance_mm, lateral(level.score_distance_mm)};
+    parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
+      Candidate& candidate = candidates[i];
+      candidate.overrun_share =
+          rim_evidence(candidate.model_from_scan, probes, rim_reach_, evidence_, options).overrun_share();
+    });
+    std::ranges::stable_partition(candidates,
+                                  [&](const Candidate& c) { return c.overrun_share <= options_.max_overrun_share; });
+  }
+
   void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {
     const std::vector<Eigen::Vector3f> around =
         points_around(points, candidate.model_from_scan, model_, 2.0 * level.robust_scale_mm[0], level.most_points);
     for (const double scale : level.robust_scale_mm) {
       candidate.model_from_scan =
-          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, !options_.paper_mode})
+          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, only_facing()})
               .model_from_scan;
     }
     judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
   }
+
+  // Walls turned away from the sensor hold no points; a sheet has no such side.
+  [[nodiscard]] bool only_facing() const { return !options_.paper_mode && !model_.is_open(); }
 
   // The published judge asks every point; ours those whose normals mean something, and passes where there are none.
   void judge_normals(Candidate& candidate) const {
@@ -301,6 +339,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("max_contradiction_share", max_contradiction_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
+  ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
