@@ -14,10 +14,7 @@ class Contrast {
  public:
   Contrast(const model::PreparedModel& model, const ScanEvidence& scan, const EvidenceOptions& options)
       : model_(model), scan_(scan), options_(options) {
-    // Model samples closer than the measurements are not independent of one another.
-    const double area = surface_area(model.skin) / static_cast<double>(model.dense_samples.size());
-    const double spacing = scan.scan.spacing_mm;
-    weight_ = spacing > 0.0 ? std::min(1.0, area / (spacing * spacing)) : 1.0;
+    weight_ = measurements_per_sample(model, scan.scan);
   }
 
   // Asks the scan about the samples that `own` puts where `other` has nothing.
@@ -86,6 +83,11 @@ class Contrast {
 };
 
 }  // namespace
+
+double measurements_per_sample(const model::PreparedModel& model, const scan::Scan& scan) {
+  const double area_mm2 = surface_area(model.skin) / static_cast<double>(model.dense_samples.size());
+  return scan.spacing_mm > 0.0 ? std::min(1.0, area_mm2 / (scan.spacing_mm * scan.spacing_mm)) : 1.0;
+}
 
 PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan, const model::PreparedModel& model,
                       const ScanEvidence& scan, const EvidenceOptions& options) {

@@ -14,6 +14,9 @@ struct PoseContrast {
   [[nodiscard]] double total() const { return for_first + for_second; }
 };
 
+/// What one of the model's dense samples counts for: samples closer than the scan's points are not independent.
+[[nodiscard]] double measurements_per_sample(const model::PreparedModel& model, const scan::Scan& scan);
+
 /// Compares two poses by the samples of the model that only one of them puts where they are: a hole that one claims and
 /// the other does not. Everything that both predict says nothing about which is right, and would drown the rest.
 ///

@@ -49,7 +49,8 @@ struct Candidate {
   double slip_lead = 0.0;      ///< measurements by which it leads over any small slip; asked where the surface is loose
   double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;   ///< model samples that the scan confirms
-  Reason objection = Reason::none;  ///< what stands against it on its own, whatever its rivals
+  double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does
+  Reason objection = Reason::none;      ///< what stands against it on its own, whatever its rivals
 };
 
 enum class Status { accepted, ambiguous, rejected };

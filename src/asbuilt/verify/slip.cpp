@@ -16,10 +16,9 @@ namespace {
 
 constexpr int kLoosest = 3;  // directions that are tried: those of a plane
 
-}  // namespace
-
-std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                const model::PreparedModel& model, double slip_mm) {
+// Both ways along those of the loosest directions that hold less than `below` of information.
+std::vector<Pose> slips(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
+                        double slip_mm, double below) {
   // A turn that the part's symmetry makes invisible is no slip.
   Matrix6d information = evidence.information;
   for (const Vector6d& twist : free_twists(model)) {
@@ -28,7 +27,7 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
   const Eigen::Vector3d centre = model.box.center();
   std::vector<Pose> slipped;
-  for (int k = 0; k < kLoosest; ++k) {
+  for (int k = 0; k < kLoosest && solver.eigenvalues()[k] < below; ++k) {
     Vector6d twist = solver.eigenvectors().col(k);
     twist.head<3>() /= 0.5 * model.diameter;  // the evidence measures rotations by the motion at half a diameter
     const double unit = displacement_mm(stepped(model_from_scan, 1e-3 * twist, centre), model_from_scan, model) / 1e-3;
@@ -38,6 +37,36 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
     }
   }
   return slipped;
+}
+
+}  // namespace
+
+std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                const model::PreparedModel& model, double slip_mm) {
+  return slips(model_from_scan, evidence, model, slip_mm, std::numeric_limits<double>::infinity());
+}
+
+Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
+                           double min_held, const ScanEvidence& scan, const EvidenceOptions& options) {
+  constexpr double kSteps[] = {0.03, 0.015, 0.0075};  // of the diameter
+  constexpr int kMostMoves = 4;                       // of each
+  constexpr double kLeastGain = 2.0;                  // measurements
+  const double below = min_held * static_cast<double>(evidence.explained_samples);
+  Pose settled = model_from_scan;
+  for (const double step : kSteps) {
+    for (int move = 0; move < kMostMoves; ++move) {
+      const Pose here = settled;
+      double most = kLeastGain;
+      for (const Pose& slipped : slips(here, evidence, model, step * model.diameter, below)) {
+        const PoseContrast seen = contrast(here, slipped, model, scan, options);
+        if (seen.for_second - seen.for_first <= most) continue;
+        most = seen.for_second - seen.for_first;
+        settled = slipped;
+      }
+      if (settled.isApprox(here)) break;
+    }
+  }
+  return settled;
 }
 
 double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,

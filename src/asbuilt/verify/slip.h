@@ -15,6 +15,13 @@ namespace asbuilt::verify {
 [[nodiscard]] std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
                                               const model::PreparedModel& model, double slip_mm);
 
+/// The pose moved along its loose directions (as above; less than `min_held` of information per explained sample) for
+/// as long as the scan prefers the slipped pose, in steps of 3 % of the diameter and less. A surface without its edges
+/// leaves registration free to drift there; the edges are asked here.
+[[nodiscard]] Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                         const model::PreparedModel& model, double min_held, const ScanEvidence& scan,
+                                         const EvidenceOptions& options);
+
 /// By how many measurements a pose leads over the slipped pose that comes closest to it (see contrast()). Sees what
 /// eigenvalues do not: that the sensor looked past the edge at which the part ends. Negative if a slip would be better.
 [[nodiscard]] double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,

@@ -20,11 +20,11 @@ double distance_of_centres_mm(const Candidate& a, const Candidate& b, const mode
   return (a.model_from_scan.inverse() * centre - b.model_from_scan.inverse() * centre).norm();
 }
 
-// Score, normals and fit are nearly independent witnesses, so a pose that is mediocre in all three is less credible
+// Score, normals, fit and rims are nearly independent witnesses, so a pose that is mediocre in all is less credible
 // than one that is weak in a single one. 1 for a perfect pose; residuals strewn evenly over the band bring it to 0.
 double proof(const Candidate& c) {
   const double evenly_strewn = 1.0 / std::sqrt(3.0);
-  return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn);
+  return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn) * (1.0 - c.overrun_share);
 }
 
 // What others hide and what returned nothing can lie, so that what was found must prove the more.
@@ -35,14 +35,14 @@ double proof_needed(const Candidate& c, const VerifyOptions& options) {
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
 // the surface does, nearly all of it must be found, and less may speak against it.
 double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
-  constexpr double kShare = 0.012;  // of the samples explained
-  return std::max(1.25 * options.min_contrast, kShare * c.explained_samples);
+  constexpr double kShare = 0.012;  // of the measurements explained
+  return std::max(1.25 * options.min_contrast, kShare * c.explained_measurements);
 }
 
 bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
   constexpr double kNearlyAll = 0.9;  // of what should be visible, as a score
   return c.score >= kNearlyAll && c.slip_lead >= edge_measurements_needed(c, options) &&
-         c.contradiction_share <= 0.5 * options.max_contradiction_share;
+         c.contradiction_share <= 0.75 * options.max_contradiction_share;
 }
 
 // Details that break a near-symmetry are few among all samples, so their mean says little; the turn is held if they are

@@ -36,6 +36,8 @@ constexpr double kSlips[] = {0.03, 0.1};
 constexpr double kRimReach = 0.03;
 constexpr std::size_t kMostRimSamples = 3000;
 
+constexpr double kPlausible = 0.75;  // of the score that is needed: where it pays to look for a better place
+
 constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
 
 /// One level of the coarse-to-fine pyramid (Sec. 3.1: three of them).
@@ -147,6 +149,7 @@ class Verification {
         context_(context),
         background_(background(scan, model, options, context)),
         evidence_(scan, with(taken, background_)),
+        measurements_per_sample_(measurements_per_sample(model, scan)),
         final_distance_(score_distance(scan, model, options)),
         shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
         rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
@@ -215,9 +218,18 @@ class Verification {
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
     }
-    const PoseEvidence evidence =
-        judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    const auto judged_densely = [&] {
+      return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+    };
+    PoseEvidence evidence = judged_densely();
+    const bool is_loose = candidate.weakest_direction < options_.min_weakest_direction;
+    if (!options_.paper_mode && is_loose && candidate.score >= kPlausible * options_.acceptance_score) {
+      candidate.model_from_scan = settled_between_edges(candidate.model_from_scan, evidence, model_,
+                                                        options_.min_weakest_direction, evidence_, options);
+      evidence = judged_densely();
+    }
+    candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
     if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
       candidate.slip_lead = std::numeric_limits<double>::infinity();
       for (const double slip : kSlips) {
@@ -239,14 +251,14 @@ class Verification {
   }
 
  private:
-  // Most places go to the best by support, from which a level asks away those that lie on something larger than the
-  // part; the rest to those with most votes, as small views of the part have little support but may have many votes.
+  // Most places go to the best by support, those that lie on something larger than the part or are clearly denied
+  // behind all others; the rest go to those with most votes: small views have little support, but may have many votes.
   [[nodiscard]] std::vector<Candidate> survivors_of(const Level& level, std::vector<Candidate> candidates) const {
     constexpr double kShareBySupport = 0.75;
     const double apart = kSamePose * model_.diameter;
     if (options_.paper_mode) return best_different(std::move(candidates), level.survivors, apart, model_, options_);
     candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
-    if (level.asks_rims) put_overrun_last(level, candidates);
+    if (level.asks_rims) put_refuted_last(level, candidates);
     if (candidates.size() <= level.survivors) return candidates;
     const auto by_support = static_cast<std::ptrdiff_t>(kShareBySupport * static_cast<double>(level.survivors));
     std::stable_sort(candidates.begin() + by_support, candidates.end(),
@@ -255,8 +267,9 @@ class Verification {
     return candidates;
   }
 
-  void put_overrun_last(const Level& level, std::vector<Candidate>& candidates) const {
+  void put_refuted_last(const Level& level, std::vector<Candidate>& candidates) const {
     constexpr std::size_t kMostProbes = 600;
+    constexpr double kClearly = 2.0;  // times the contradictions allowed, as the pose is not yet precise
     const auto probes = std::span(rim_probes_).first(std::min(kMostProbes, rim_probes_.size()));
     const EvidenceOptions options{level.score_distance_mm, lateral(level.score_distance_mm)};
     parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
@@ -264,8 +277,10 @@ class Verification {
       candidate.overrun_share =
           rim_evidence(candidate.model_from_scan, probes, rim_reach_, evidence_, options).overrun_share();
     });
-    std::ranges::stable_partition(candidates,
-                                  [&](const Candidate& c) { return c.overrun_share <= options_.max_overrun_share; });
+    std::ranges::stable_partition(candidates, [&](const Candidate& c) {
+      return c.overrun_share <= options_.max_overrun_share &&
+             c.contradiction_share <= kClearly * options_.max_contradiction_share;
+    });
   }
 
   void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {
@@ -317,6 +332,7 @@ class Verification {
   const Context& context_;
   std::vector<std::uint8_t> background_;
   ScanEvidence evidence_;
+  double measurements_per_sample_;
   double final_distance_;
   std::vector<Eigen::Vector3f> shuffled_foreground_;
   double rim_reach_;

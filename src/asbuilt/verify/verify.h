@@ -23,10 +23,10 @@ struct VerifyOptions {
   double min_margin = 0.03;          ///< support by which the best pose must beat any different one
   double min_contrast = 12.0;        ///< measurements by which it must lead where the two predict different things
   double min_contrast_share = 0.75;  ///< of these measurements, that must speak for it
-  double max_free_space_share = 0.08;      ///< of should-be-visible samples seen through
-  double max_residual_ratio = 0.35;        ///< RMS of the points on the model / score distance (0.58: evenly strewn)
-  double max_contradiction_share = 0.045;  ///< of should-be-visible samples that the scan denies
-  double min_proof = 0.34;                 ///< score * normal agreement * (1 - residual ratio / 0.58)
+  double max_free_space_share = 0.08;     ///< of should-be-visible samples seen through
+  double max_residual_ratio = 0.35;       ///< RMS of the points on the model / score distance (0.58: evenly strewn)
+  double max_contradiction_share = 0.03;  ///< of should-be-visible samples that the scan denies
+  double min_proof = 0.34;                ///< score * normal agreement * (1 - residual ratio / 0.58)
   double hidden_surcharge =
       0.15;  ///< added to min_proof per share of the part that other things hide: what hides can lie
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
