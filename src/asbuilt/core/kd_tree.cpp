@@ -2,93 +2,130 @@
 #include "asbuilt/core/kd_tree.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
-#include <nanoflann.hpp>
-#include <tuple>
+
+#include "asbuilt/core/result.h"
 
 namespace asbuilt {
 namespace {
 
-struct Points {
-  std::vector<Eigen::Vector3f> values;
+constexpr std::size_t kLeafSize = 8;
 
-  [[nodiscard]] std::size_t kdtree_get_point_count() const { return values.size(); }
-  [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return values[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
+struct IndexedPoint {
+  std::array<float, 3> place;
+  std::uint32_t index;
 };
 
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Points, float, std::uint32_t>,
-                                                 Points, 3, std::uint32_t>;
+/// A few points next to one another, axis by axis, so that their distances are found by vector instructions. Places
+/// that are not taken are infinitely far.
+struct Leaf {
+  std::array<std::array<float, kLeafSize>, 3> place;
+  std::array<std::uint32_t, kLeafSize> index;
+};
 
-// nanoflann offers a candidate only if it is strictly nearer than the worst one kept. To let the lower index win a
-// tie, the result sets below report the next larger float as their worst distance and compare for themselves.
-float just_above(float value) { return std::nextafter(value, std::numeric_limits<float>::infinity()); }
+/// A cut across one axis, or a leaf.
+struct Node {
+  static constexpr std::uint32_t kLeaf = 3;
+  float left_end = 0.0F, right_start = 0.0F;  ///< along the axis; nothing lies between
+  std::uint32_t axis = kLeaf;
+  std::uint32_t other = 0;  ///< the right child (the left one follows its parent), or the leaf
+};
 
-bool is_better(float distance, std::uint32_t index, const KdTree::Neighbour& other) {
-  return std::tie(distance, index) < std::tie(other.squared_distance, other.index);
+struct Box {
+  std::array<float, 3> low, high;
+};
+
+Box box_of(std::span<const IndexedPoint> points) {
+  Box box{points.front().place, points.front().place};
+  for (const IndexedPoint& point : points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.low[axis] = std::min(box.low[axis], point.place[axis]);
+      box.high[axis] = std::max(box.high[axis], point.place[axis]);
+    }
+  }
+  return box;
 }
+
+std::size_t widest_axis(const Box& box) {
+  std::size_t widest = 0;
+  for (std::size_t axis = 1; axis < 3; ++axis) {
+    if (box.high[axis] - box.low[axis] > box.high[widest] - box.low[widest]) widest = axis;
+  }
+  return widest;
+}
+
+// Rearranges the points so that those before the returned place are no further along the axis than the others. The
+// middle of the box is the quicker cut; the median keeps the tree shallow whatever the points, and the leaves full.
+std::size_t cut(std::span<IndexedPoint> points, std::size_t axis, float low, float high) {
+  constexpr std::size_t kFullLeavesFrom = 8 * kLeafSize, kLeastShare = 8;
+  if (points.size() > kFullLeavesFrom) {
+    const float middle = 0.5F * low + 0.5F * high;
+    const auto at = std::partition(points.begin(), points.end(),
+                                   [&](const IndexedPoint& point) { return point.place[axis] < middle; });
+    const auto left = static_cast<std::size_t>(at - points.begin());
+    if (std::min(left, points.size() - left) >= points.size() / kLeastShare) return left;
+  }
+  const std::size_t leaves = (points.size() + kLeafSize - 1) / kLeafSize;
+  const std::size_t median = leaves / 2 * kLeafSize;
+  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(median), points.end(),
+                   [&](const IndexedPoint& a, const IndexedPoint& b) { return a.place[axis] < b.place[axis]; });
+  return median;
+}
+
+// Squared distances are never negative, so their bit patterns are in the same order, and integers can be compared
+// several at a time.
+std::int32_t ordered_bits(float not_negative) { return std::bit_cast<std::int32_t>(not_negative); }
+
+// One number to compare by: distance, then index.
+std::uint64_t rank(const KdTree::Neighbour& neighbour) {
+  return static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(neighbour.squared_distance)) << 32 | neighbour.index;
+}
+
+// What a search keeps. reach(): squared, inclusive; what is farther need not be offered, the rest in any order.
 
 template <class Accept>
 struct NearestOne {
-  using DistanceType = float;
   KdTree::Neighbour best;
-  float reach;  // squared, inclusive
+  float limit;
   const Accept& accept;
 
-  [[nodiscard]] std::size_t size() const { return best.found() ? 1 : 0; }
-  [[nodiscard]] bool full() const { return true; }
-  [[nodiscard]] float worstDist() const { return just_above(best.found() ? best.squared_distance : reach); }
-  bool addPoint(float distance, std::uint32_t index) {
-    const bool in_reach = distance <= reach;
-    if (in_reach && (!best.found() || is_better(distance, index, best)) && accept(index)) best = {index, distance};
-    return true;
+  [[nodiscard]] float reach() const { return best.found() ? best.squared_distance : limit; }
+  void offer(float distance, std::uint32_t index) {
+    const KdTree::Neighbour offered{index, distance};
+    if (rank(offered) < rank(best) && accept(index)) best = offered;
   }
 };
 
 struct NearestMany {
-  using DistanceType = float;
   std::vector<KdTree::Neighbour>& kept;  // sorted, nearest first
   std::size_t capacity;
 
-  [[nodiscard]] std::size_t size() const { return kept.size(); }
-  [[nodiscard]] bool full() const { return kept.size() == capacity; }
-  [[nodiscard]] float worstDist() const {
-    return full() ? just_above(kept.back().squared_distance) : std::numeric_limits<float>::infinity();
+  [[nodiscard]] float reach() const {
+    return kept.size() == capacity ? kept.back().squared_distance : std::numeric_limits<float>::max();
   }
-  bool addPoint(float distance, std::uint32_t index) {
-    if (full()) {
-      if (!is_better(distance, index, kept.back())) return true;
-      kept.pop_back();
+  void offer(float distance, std::uint32_t index) {
+    const KdTree::Neighbour offered{index, distance};
+    const std::uint64_t own = rank(offered);
+    if (kept.size() < capacity) {
+      kept.push_back(offered);
+    } else if (own > rank(kept.back())) {
+      return;
     }
-    const auto place = std::find_if(kept.begin(), kept.end(),
-                                    [&](const KdTree::Neighbour& other) { return is_better(distance, index, other); });
-    kept.insert(place, {index, distance});
-    return true;
+    std::size_t place = kept.size() - 1;
+    for (; place > 0 && own < rank(kept[place - 1]); --place) kept[place] = kept[place - 1];
+    kept[place] = offered;
   }
 };
 
 struct AllWithin {
-  using DistanceType = float;
   std::vector<KdTree::Neighbour>& kept;
-  float reach;  // squared, inclusive
+  float limit;
 
-  [[nodiscard]] std::size_t size() const { return kept.size(); }
-  [[nodiscard]] bool full() const { return true; }
-  [[nodiscard]] float worstDist() const { return just_above(reach); }
-  bool addPoint(float distance, std::uint32_t index) {
-    if (distance <= reach) kept.push_back({index, distance});
-    return true;
-  }
+  [[nodiscard]] float reach() const { return limit; }
+  void offer(float distance, std::uint32_t index) { kept.push_back({index, distance}); }
 };
-
-// nanoflann adds up the distance to a cell from one float per level of the tree; rounding can carry it beyond the
-// distance of a point inside, and a tied or nearest point is lost. This much slack covers a tree of any useful depth.
-constexpr float kPruningSlack = -1e-5F;
 
 float squared_reach(float distance) {
   return std::isinf(distance) ? std::numeric_limits<float>::max() : distance * distance;
@@ -97,16 +134,97 @@ float squared_reach(float distance) {
 }  // namespace
 
 struct KdTree::Implementation {
-  explicit Implementation(std::span<const Eigen::Vector3f> source)
-      : points{{source.begin(), source.end()}}, tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(12)) {}
+  explicit Implementation(std::span<const Eigen::Vector3f> source) : count(source.size()) {
+    ASBUILT_EXPECT(count < kNone, "fewer points than an index can tell apart");
+    if (source.empty()) return;
+    std::vector<IndexedPoint> points(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      points[i] = {{source[i].x(), source[i].y(), source[i].z()}, static_cast<std::uint32_t>(i)};
+    }
+    leaves.reserve(count / (kLeafSize / 2) + 1);
+    nodes.reserve(2 * leaves.capacity());
+    add(points);
+  }
+
+  Box add(std::span<IndexedPoint> points) {
+    const std::size_t own = nodes.size();
+    nodes.emplace_back();
+    const Box box = box_of(points);
+    if (points.size() <= kLeafSize) {
+      nodes[own].other = static_cast<std::uint32_t>(leaves.size());
+      add_leaf(points);
+      return box;
+    }
+    const std::size_t axis = widest_axis(box);
+    const std::size_t left = cut(points, axis, box.low[axis], box.high[axis]);
+    const float left_end = add(points.first(left)).high[axis];
+    const auto right = static_cast<std::uint32_t>(nodes.size());
+    const float right_start = add(points.subspan(left)).low[axis];
+    nodes[own] = {left_end, right_start, static_cast<std::uint32_t>(axis), right};
+    return box;
+  }
+
+  void add_leaf(std::span<const IndexedPoint> points) {
+    Leaf& leaf = leaves.emplace_back();
+    for (auto& coordinates : leaf.place) coordinates.fill(std::numeric_limits<float>::infinity());
+    leaf.index.fill(kNone);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) leaf.place[axis][i] = points[i].place[axis];
+      leaf.index[i] = points[i].index;
+    }
+  }
 
   template <class ResultSet>
   void search(const Eigen::Vector3f& query, ResultSet& result) const {
-    if (!points.values.empty()) tree.findNeighbors(result, query.data(), nanoflann::SearchParams(32, kPruningSlack));
+    if (count > 0) search(0, {query.x(), query.y(), query.z()}, {0.0F, 0.0F, 0.0F}, result);
   }
 
-  Points points;
-  Tree tree;
+  // `apart` is how far the query lies outside the node's box along each axis. Differences, squares and sums are rounded
+  // as those of the points are, and rounding keeps their order: a bound is never above the distance of a point inside.
+  template <class ResultSet>
+  void search(std::uint32_t at, const std::array<float, 3>& query, std::array<float, 3> apart,
+              ResultSet& result) const {
+    while (nodes[at].axis != Node::kLeaf) {
+      const Node& node = nodes[at];
+      const float place = query[node.axis];
+      std::array<float, 3> left = apart, right = apart;
+      left[node.axis] = std::max(apart[node.axis], place - node.left_end);
+      right[node.axis] = std::max(apart[node.axis], node.right_start - place);
+      const bool left_first = left[node.axis] <= right[node.axis];
+      const std::uint32_t nearer = left_first ? at + 1 : node.other, farther = left_first ? node.other : at + 1;
+      if (is_within(left_first ? left : right, result)) search(nearer, query, left_first ? left : right, result);
+      apart = left_first ? right : left;
+      if (!is_within(apart, result)) return;
+      at = farther;
+    }
+    search_leaf(leaves[nodes[at].other], query, result);
+  }
+
+  template <class ResultSet>
+  static bool is_within(const std::array<float, 3>& apart, const ResultSet& result) {
+    return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] <= result.reach();
+  }
+
+  template <class ResultSet>
+  static void search_leaf(const Leaf& leaf, const std::array<float, 3>& query, ResultSet& result) {
+    std::array<float, kLeafSize> distance;
+    std::int32_t within = 0;
+    const std::int32_t reach = ordered_bits(result.reach());
+    for (std::size_t i = 0; i < kLeafSize; ++i) {
+      const float x = query[0] - leaf.place[0][i], y = query[1] - leaf.place[1][i], z = query[2] - leaf.place[2][i];
+      distance[i] = x * x + y * y + z * z;
+      within += ordered_bits(distance[i]) <= reach ? 1 : 0;
+    }
+    for (std::size_t i = 0; within > 0; ++i) {
+      if (ordered_bits(distance[i]) > reach) continue;
+      --within;
+      if (distance[i] <= result.reach()) result.offer(distance[i], leaf.index[i]);
+    }
+  }
+
+  std::size_t count;
+  std::vector<Node> nodes;
+  std::vector<Leaf> leaves;
 };
 
 KdTree::KdTree(std::span<const Eigen::Vector3f> points) : implementation_(std::make_unique<Implementation>(points)) {}
@@ -114,7 +232,7 @@ KdTree::~KdTree() = default;
 KdTree::KdTree(KdTree&&) noexcept = default;
 KdTree& KdTree::operator=(KdTree&&) noexcept = default;
 
-std::size_t KdTree::size() const { return implementation_->points.values.size(); }
+std::size_t KdTree::size() const { return implementation_->count; }
 
 KdTree::Neighbour KdTree::nearest(const Eigen::Vector3f& query, float max_distance) const {
   const auto any = [](std::uint32_t) { return true; };

@@ -61,48 +61,50 @@ std::uint32_t Quantisation::bin(const PointPairFeature& feature) const {
 }
 
 Quantisation::Bins Quantisation::soft_bins(const PointPairFeature& feature, int wanted, float reach) const {
-  Bins result;
   const std::array<float, 4> value = in_bins(feature, *this);
   const std::array<int, 4> size = sizes(*this);
-  std::array<int, 4> own, beside;
-  std::array<float, 4> cost;  // distance to the border that must be crossed
+  const int layer = angle_bins * angle_bins;
+  const std::array<int, 4> stride{layer * angle_bins, layer, angle_bins, 1};
+  // All subsets of the borders that may be crossed, in the order of their bits. The bins are cheapest first; equal
+  // costs keep that order.
+  std::array<float, kMostNeighbours> total;  // distance to the borders that must be crossed
+  std::array<int, kMostNeighbours> step;     // from the own bin
+  total[0] = 0.0F;
+  step[0] = 0;
+  std::size_t subsets = 1;
+  int own_bin = 0;
+  bool is_past_end = false;
   for (std::size_t i = 0; i < 4; ++i) {
     // A distance just past the last bin may still have come from it.
-    own[i] = std::clamp(static_cast<int>(value[i]), 0, i == 0 ? size[i] : size[i] - 1);
-    const float share = value[i] - static_cast<float>(own[i]);
-    beside[i] = share < 0.5F ? own[i] - 1 : own[i] + 1;
-    cost[i] = share < 0.5F ? share : 1.0F - share;
+    const int own = std::clamp(static_cast<int>(value[i]), 0, i == 0 ? size[i] : size[i] - 1);
+    const float share = value[i] - static_cast<float>(own);
+    const int direction = share < 0.5F ? -1 : 1;
+    const float cost = share < 0.5F ? share : 1.0F - share;
+    own_bin += own * stride[i];
+    const bool may_cross = cost < reach && own + direction >= 0 && own + direction < size[i];
+    if (own == size[i]) {
+      is_past_end = true;
+      if (!may_cross) return {};
+    }
+    if (!may_cross) continue;
+    for (std::size_t k = 0; k < subsets; ++k) {
+      total[subsets + k] = total[k] + cost;
+      step[subsets + k] = step[k] + direction * stride[i];
+    }
+    subsets *= 2;
   }
-  struct Choice {
-    float cost;
-    int crossings;
-  };
-  std::array<Choice, kMostNeighbours> choices;
-  int count = 0;
-  for (int crossings = 0; crossings < kMostNeighbours; ++crossings) {
-    float total = 0.0F;
-    bool exists = true;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const bool crosses = ((crossings >> i) & 1) != 0;
-      const int index = crosses ? beside[i] : own[i];
-      exists = exists && index >= 0 && index < size[i] && (!crosses || cost[i] < reach);
-      total += crosses ? cost[i] : 0.0F;
+  Bins result;
+  std::array<float, kMostNeighbours> kept;
+  // Past the end, the border of the distance is the lowest bit and has to be crossed.
+  for (std::size_t k = is_past_end ? 1 : 0; k < subsets; k += is_past_end ? 2 : 1) {
+    if (result.count == wanted && !(total[k] < kept[static_cast<std::size_t>(wanted - 1)])) continue;
+    auto place = static_cast<std::size_t>(result.count < wanted ? result.count++ : wanted - 1);
+    for (; place > 0 && kept[place - 1] > total[k]; --place) {
+      kept[place] = kept[place - 1];
+      result.bin[place] = result.bin[place - 1];
     }
-    if (!exists) continue;
-    // Insertion keeps the cheapest first; equal costs keep the order of the crossings.
-    int place = count++;
-    for (; place > 0 && choices[static_cast<std::size_t>(place - 1)].cost > total; --place) {
-      choices[static_cast<std::size_t>(place)] = choices[static_cast<std::size_t>(place - 1)];
-    }
-    choices[static_cast<std::size_t>(place)] = {total, crossings};
-  }
-  result.count = std::min(count, wanted);
-  for (int k = 0; k < result.count; ++k) {
-    std::array<int, 4> index;
-    for (std::size_t i = 0; i < 4; ++i) {
-      index[i] = ((choices[static_cast<std::size_t>(k)].crossings >> i) & 1) != 0 ? beside[i] : own[i];
-    }
-    result.bin[static_cast<std::size_t>(k)] = flat(index, *this);
+    kept[place] = total[k];
+    result.bin[place] = static_cast<std::uint32_t>(own_bin + step[k]);
   }
   return result;
 }

@@ -2,6 +2,8 @@
 #include "asbuilt/detect/voting.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -9,6 +11,7 @@ namespace asbuilt::detect {
 namespace {
 
 constexpr float kTurn = 2.0F * std::numbers::pi_v<float>;
+constexpr std::size_t kBlock = 256;  // votes whose places are found at a time
 
 std::uint16_t fraction_of_turn(float angle) {
   return static_cast<std::uint16_t>(static_cast<std::int32_t>(std::lround(angle / kTurn * 65536.0F)));
@@ -17,8 +20,11 @@ std::uint16_t fraction_of_turn(float angle) {
 }  // namespace
 
 LocalVoting::LocalVoting(const Codebook& codebook, const Scene& scene, const DetectOptions& options)
-    : codebook_(codebook), scene_(scene), options_(options) {
-  votes_.resize(codebook.samples.size() * static_cast<std::size_t>(options.alpha_bins));
+    : codebook_(codebook),
+      scene_(scene),
+      options_(options),
+      row_shift_(static_cast<unsigned>(std::bit_width(static_cast<unsigned>(options.alpha_bins) - 1U))) {
+  votes_.resize(codebook.samples.size() << row_shift_);
 }
 
 void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector3f& reference_normal,
@@ -27,7 +33,6 @@ void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector
   const Quantisation::Bins bins =
       codebook_.quantisation.soft_bins(feature, options_.neighbour_bins, static_cast<float>(options_.border_reach));
   if (bins.count == 0) return;
-  const auto alpha_bins = static_cast<std::uint32_t>(options_.alpha_bins);
   const std::uint16_t angle = fraction_of_turn(scene_angle);
   // p(f_k | f) = 1 / K: K is what the options say, also where a neighbour does not exist.
   const float feature_weight = 1.0F / static_cast<float>(options_.paper_mode ? options_.neighbour_bins : bins.count);
@@ -35,13 +40,25 @@ void LocalVoting::add_pair(const Eigen::Vector3f& reference, const Eigen::Vector
     const std::span<const Codebook::Entry> bucket = codebook_.bucket(bins.bin[static_cast<std::size_t>(k)]);
     if (bucket.empty() || bucket.size() > codebook_.largest_voting_bucket) continue;
     const float weight = feature_weight * codebook_.bucket_weight[bins.bin[static_cast<std::size_t>(k)]];
-    float* const votes = votes_.data();
-    for (const Codebook::Entry& entry : bucket) {
-      const auto alpha = static_cast<std::uint16_t>(angle - entry.angle);
-      votes[entry.reference * alpha_bins + ((alpha * alpha_bins) >> 16)] += weight;
+    for (std::size_t begin = 0; begin < bucket.size(); begin += kBlock) {
+      add_votes(bucket.subspan(begin, std::min(kBlock, bucket.size() - begin)), angle, weight);
     }
     cast_ += bucket.size();
   }
+}
+
+// Two loops: finding the places is arithmetic that the compiler turns into vector instructions; the additions, which
+// may meet in one place, have to follow one another.
+void LocalVoting::add_votes(std::span<const Codebook::Entry> entries, std::uint16_t angle, float weight) {
+  const auto alpha_bins = static_cast<std::uint16_t>(options_.alpha_bins);
+  std::array<std::uint32_t, kBlock> places;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const auto alpha = static_cast<std::uint16_t>(angle - entries[i].angle);
+    const auto bin = static_cast<std::uint16_t>((static_cast<std::uint32_t>(alpha) * alpha_bins) >> 16);
+    places[i] = (static_cast<std::uint32_t>(entries[i].reference) << row_shift_) + bin;
+  }
+  float* const votes = votes_.data();
+  for (std::size_t i = 0; i < entries.size(); ++i) votes[places[i]] += weight;
 }
 
 std::vector<Peak> LocalVoting::vote(std::uint32_t reference, float sign) {
@@ -74,7 +91,7 @@ std::vector<Peak> LocalVoting::peaks(const Pose& scene_frame, const Eigen::Vecto
   std::vector<float> around(count + 2), values(count);
   std::vector<Peak> best_of_sample;
   for (std::size_t m = 0; m < codebook_.samples.size(); ++m) {
-    const float* row = votes_.data() + m * count;
+    const float* row = votes_.data() + (m << row_shift_);
     std::copy(row, row + count, values.begin());
     if (smooth) {
       // A true alpha near a border splits its votes over two bins; neighbours are counted at half.
@@ -96,13 +113,17 @@ std::vector<Peak> LocalVoting::peaks(const Pose& scene_frame, const Eigen::Vecto
     const float alpha = (static_cast<float>(best) + 0.5F + shift) * kTurn / static_cast<float>(bins);
     best_of_sample.push_back({static_cast<std::uint32_t>(m), alpha, height});
   }
-  std::ranges::sort(best_of_sample, [](const Peak& a, const Peak& b) {
-    return a.votes != b.votes ? a.votes > b.votes : a.model_sample < b.model_sample;
-  });
+  // A heap, since only the first few are asked for.
+  const auto comes_after = [](const Peak& a, const Peak& b) {
+    return a.votes != b.votes ? a.votes < b.votes : a.model_sample > b.model_sample;
+  };
+  std::ranges::make_heap(best_of_sample, comes_after);
 
   std::vector<Peak> kept;
-  for (const Peak& peak : best_of_sample) {
-    if (kept.size() == static_cast<std::size_t>(options_.peaks_per_reference)) break;
+  while (!best_of_sample.empty() && kept.size() < static_cast<std::size_t>(options_.peaks_per_reference)) {
+    std::ranges::pop_heap(best_of_sample, comes_after);
+    const Peak peak = best_of_sample.back();
+    best_of_sample.pop_back();
     if (!kept.empty() && peak.votes < static_cast<float>(options_.peak_ratio) * kept.front().votes) break;
     if (check_view) {
       const Pose pose = model_from_scan_of(codebook_.frames[peak.model_sample], scene_frame, peak.alpha);

@@ -40,11 +40,13 @@ class LocalVoting {
  private:
   void add_pair(const Eigen::Vector3f& reference, const Eigen::Vector3f& reference_normal, const Eigen::Vector3f& other,
                 const Eigen::Vector3f& other_normal, float scene_angle);
+  void add_votes(std::span<const Codebook::Entry> entries, std::uint16_t angle, float weight);
   [[nodiscard]] std::vector<Peak> peaks(const Pose& scene_frame, const Eigen::Vector3f& reference) const;
 
   const Codebook& codebook_;
   const Scene& scene_;
-  DetectOptions options_;  // a copy: callers pass temporaries
+  DetectOptions options_;     // a copy: callers pass temporaries
+  unsigned row_shift_;        // rows are a power of two apart, which spares a multiplication a vote
   std::vector<float> votes_;  // [model sample][alpha bin]
   std::uint64_t cast_ = 0;
 };
