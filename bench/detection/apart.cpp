@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -70,6 +71,7 @@ Result<std::string> run_apart(double seconds, const std::function<std::string()>
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // whoever stops the suite stops this, too
     work_and_leave(ends[1], work);
   }
   close(ends[1]);
