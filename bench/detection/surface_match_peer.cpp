@@ -27,7 +27,7 @@ namespace {
 constexpr double kSecondsAtMost = 300.0;  // for training and a scan; a scan beyond that counts as not found
 
 // Of the key points its default; of the score its sample's. A scan shows a part from one side only, while the score is
-// the share of the whole part: the default of 0.2 refuses most of the scans that 0.1 finds.
+// the share of the whole part: at the default of 0.2 it found fewer.
 constexpr float kKeyPointShare = 0.2F, kLeastScore = 0.1F;
 constexpr double kModelSamplingRatio = 0.025;  // our dense samples stand at a third of it, finer than its 0.01
 constexpr double kSceneSpacing = 0.005;        // of the diameter; its registration samples the scene at 0.01
