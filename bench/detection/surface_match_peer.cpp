@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // asbuilt_detection_surface_match: the same scans through surface_match (github.com/SurfaceMan/surface_match), a public
-// point pair detector with registration and a score, at the defaults of its interface but for the least score. It
+// point pair detector with registration and a score, at the defaults of its interface. It
 // samples model and scene itself; what it samples from is ours: the part's dense samples and the scan at a spacing of
 // half its registration's, both with normals fitted over the sampling distance and turned outwards or to the sensor.
 #include <omp.h>
@@ -26,9 +26,8 @@ namespace {
 
 constexpr double kSecondsAtMost = 300.0;  // for training and a scan; a scan beyond that counts as not found
 
-// Of the key points its default; of the score its sample's. A scan shows a part from one side only, while the score is
-// the share of the whole part: at the default of 0.2 it found fewer.
-constexpr float kKeyPointShare = 0.2F, kLeastScore = 0.1F;
+// Its defaults, written down where its header tells what they mean.
+constexpr float kKeyPointShare = 0.2F, kLeastScore = 0.2F;
 constexpr double kModelSamplingRatio = 0.025;  // our dense samples stand at a third of it, finer than its 0.01
 constexpr double kSceneSpacing = 0.005;        // of the diameter; its registration samples the scene at 0.01
 
