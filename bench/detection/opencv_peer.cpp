@@ -3,22 +3,16 @@
 // with its defaults and the figures of its own sample. What the sample leaves to the user is done as well as we can:
 // model and scene are sampled evenly at the same spacing in mm (its own sampling is relative to the scene, of whatever
 // size that is), with normals fitted over that spacing and turned to the sensor, all by our code.
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
-#include <exception>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/surface_matching.hpp>
 #include <opencv2/surface_matching/ppf_helpers.hpp>
 
 #include "asbuilt/model/prepared_model.h"
-#include "asbuilt/model/sample_normals.h"
 #include "asbuilt/scan/scan.h"
+#include "peer.h"
 #include "record.h"
-#include "selection.h"
 
 namespace asbuilt::bench {
 namespace {
@@ -50,9 +44,7 @@ Pose model_from_scan_of(const ppf::Pose3D& found) {
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) scan_from_model(row, column) = found.pose(row, column);
   }
-  Pose pose;
-  pose.matrix() = scan_from_model;
-  return orthonormalised(pose).inverse();
+  return bench::model_from_scan_of(scan_from_model);
 }
 
 double extent_mm(const PointCloud& cloud) {
@@ -65,19 +57,14 @@ double extent_mm(const PointCloud& cloud) {
 struct Trained {
   ppf::PPF3DDetector detector;
   cv::Mat dense;
-  double diameter_mm = 0.0, spacing_mm = 0.0;
+  double spacing_mm = 0.0;
 };
 
 Result<std::shared_ptr<Trained>> trained(const SuitePart& part, double sampling_ratio, const Context& context) {
-  model::ModelOptions options;
-  options.sampling_ratio = sampling_ratio;
-  ASBUILT_TRY(model, model::prepare(part.mesh, options, context));
-  PointCloud dense = model.dense_samples;
-  dense.normals = model::fitted_normals(model.dense_samples, model.dense_samples, model.sampling_distance, context);
+  ASBUILT_TRY(model, sampled(part, sampling_ratio, context));
   auto result = std::make_shared<Trained>();
   result->detector = ppf::PPF3DDetector(sampling_ratio, kRelativeDistanceStep);
-  result->dense = to_mat(dense);
-  result->diameter_mm = model.diameter;
+  result->dense = to_mat(model.dense_samples);
   result->spacing_mm = model.sampling_distance;
   result->detector.trainModel(to_mat(model.samples));
   return result;
@@ -127,35 +114,16 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
   return {};
 }
 
-int run(int argc, char** argv) {
-  Selection selection;
-  double sampling_ratio = 0.025;
-  CLI::App app("The scans of the detection suite through OpenCV's surface_matching");
-  add_options(app, selection);
-  app.add_option("--sampling", sampling_ratio, "relative sampling step of the model")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
-
-  const Context context(selection.threads);
-  const auto judge_for = [&](const SuitePart& part) -> Result<Judge> {
-    ASBUILT_TRY(detector, trained(part, sampling_ratio, context));
-    return [&, detector](CaseRecord& record, const CaseScan& scan) {
-      return judge(record, scan, part, *detector, context);
-    };
-  };
-  const auto done = run_cases(selection, fmt::format("opencv {:g}", sampling_ratio), judge_for, context);
-  if (done) return 0;
-  fmt::print(stderr, "asbuilt_detection_opencv: {}\n", done.error().message);
-  return 1;
+Result<Judge> judge_for(const SuitePart& part, const Peer& peer, const Selection&, const Context& context) {
+  ASBUILT_TRY(detector, trained(part, peer.sampling_ratio, context));
+  return
+      [&, detector](CaseRecord& record, const CaseScan& scan) { return judge(record, scan, part, *detector, context); };
 }
 
 }  // namespace
 }  // namespace asbuilt::bench
 
 int main(int argc, char** argv) {
-  try {
-    return asbuilt::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "asbuilt_detection_opencv: %s\n", error.what());
-    return 1;
-  }
+  return asbuilt::bench::run_peer(argc, argv,
+                                  {"opencv", "OpenCV's surface_matching", 0.025, asbuilt::bench::judge_for});
 }
