@@ -32,6 +32,25 @@ TEST(Codebook, HoldsEveryOrderedPairOnceInPaperMode) {
   EXPECT_TRUE(std::ranges::is_sorted(book->offsets));
 }
 
+// A sheet may be seen from behind: its samples are there twice, once for each side, and no pair mixes the sides, which
+// no viewpoint sees together.
+TEST(Codebook, KnowsBothSidesOfASheet) {
+  TriangleMesh sheet;  // a bent one, so that it is no plane
+  sheet.vertices = {{0, 0, 0}, {60, 0, 0}, {60, 40, 0}, {0, 40, 0}, {0, 0, 50}, {0, 40, 50}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}};
+  const model::PreparedModel model = model::prepare(sheet, {}, Context(2)).value();
+  ASSERT_TRUE(model.is_open());
+  const auto book = book_of(model, false);
+  EXPECT_EQ(book->samples.size(), 2 * model.samples.size());
+  EXPECT_EQ(book_of(model, true)->samples.size(), model.samples.size());
+  for (std::size_t i = 0; i < model.samples.size(); ++i) {
+    const std::size_t back = model.samples.size() + i;
+    EXPECT_EQ(book->samples.positions[back], book->samples.positions[i]);
+    EXPECT_EQ(book->samples.normals[back], -book->samples.normals[i]);
+    EXPECT_FALSE(book->seen_from[i].meets(book->seen_from[back])) << i;
+  }
+}
+
 // Which pairs a bucket must hold, recomputed sample by sample from the definitions.
 TEST(Codebook, HasEachPairInTheBucketOfItsFeature) {
   const auto book = book_of(test::small_model(), true);

@@ -84,5 +84,23 @@ TEST(Slip, ABeamThatReachesOutOfTheFieldOfViewIsNot) {
   EXPECT_LT(seen.lead(), kLimits.min_contrast);
 }
 
+TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
+  const Asked seen(beam(300), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
+  for (const double drift_mm : {-25.0, 12.0, 20.0}) {
+    const Pose drifted = Eigen::Translation3d(drift_mm, 0, 0) * seen.model_from_scan;
+    const PoseEvidence evidence = evidence_for(drifted, seen.model.dense_samples, seen.model, *seen.seen, seen.options);
+    const Pose settled =
+        settled_between_edges(drifted, evidence, seen.model, kLimits.min_weakest_direction, *seen.seen, seen.options);
+    EXPECT_LT(displacement_mm(settled, seen.model_from_scan, seen.model), 0.01 * seen.model.diameter) << drift_mm;
+  }
+}
+
+TEST(Slip, WhatTheSurfaceHoldsIsNotMovedByItsEdges) {
+  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
+  const Pose settled = settled_between_edges(brick.model_from_scan, brick.evidence, brick.model,
+                                             kLimits.min_weakest_direction, *brick.seen, brick.options);
+  EXPECT_TRUE(settled.isApprox(brick.model_from_scan));
+}
+
 }  // namespace
 }  // namespace asbuilt::verify

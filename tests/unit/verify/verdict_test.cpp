@@ -83,13 +83,37 @@ TEST(Verdict, AsksForMoreProofWhereMoreIsHidden) {
 
 TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndNoContradiction) {
   Candidate candidate = flawless();
-  candidate.weakest_direction = 0.0, candidate.explained_samples = 2000;
-  candidate.slip_lead = 30.0;  // 2 % of 2000 are 40
+  candidate.weakest_direction = 0.0, candidate.explained_measurements = 2000.0;
+  candidate.slip_lead = 20.0;  // 1.2 % of 2000 are 24
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
   candidate.slip_lead = 50.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.contradiction_share = 0.04;  // allowed where the surface holds it
+  candidate.contradiction_share = 0.025;  // allowed where the surface holds it
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+}
+
+TEST(Verdict, WhereOnlyTheEdgesHoldAPoseNearlyAllOfItMustBeFound) {
+  Candidate candidate = flawless();
+  candidate.weakest_direction = 0.0, candidate.slip_lead = 150.0, candidate.explained_measurements = 1200.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.score = 0.8;  // enough where the surface holds it
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+}
+
+TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {
+  Candidate candidate = flawless();
+  candidate.score = 0.75, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.44
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.missing_share = 0.45;  // 0.34 + 0.3 * 0.45 = 0.475
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+}
+
+TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
+  Candidate candidate = flawless();
+  candidate.score = 0.75, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.39
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.overrun_share = 0.18;  // allowed by itself; 0.39 * 0.82 = 0.32
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
 TEST(Verdict, IsNotShakenByARefutedPoseWithMoreSupport) {
