@@ -28,6 +28,7 @@ struct Arguments {
   Selection selection;
   std::string mode = "default";
   std::vector<std::string> settings;
+  std::string only;  ///< group of parts that a summary is about; empty: all that were judged
 };
 
 io::OptionValue option_value(const std::string& text) {
@@ -111,20 +112,33 @@ std::map<std::string, std::vector<CaseRecord>> by_group(const std::vector<CaseRe
   return groups;
 }
 
-Result<void> summarise(const std::filesystem::path& output) {
+/// Takes out the records of parts that are not of the group.
+Result<void> keep_only(std::vector<CaseRecord>& records, Selection selection, const std::string& group) {
+  selection.group = group;
+  ASBUILT_TRY(parts, suite_parts(selection));
+  std::erase_if(records, [&](const CaseRecord& record) {
+    return std::ranges::find(parts, record.part, &SuitePart::name) == parts.end();
+  });
+  return {};
+}
+
+Result<void> summarise(const Arguments& arguments) {
+  const std::filesystem::path& output = arguments.selection.output;
   ASBUILT_TRY(records, read_records(output / "cases.jsonl"));
+  if (!arguments.only.empty()) ASBUILT_CHECK(keep_only(records, arguments.selection, arguments.only));
+  const std::string suffix = arguments.only.empty() ? "" : "_" + arguments.only;
   nlohmann::ordered_json summary = summary_of(records);
   const std::string text = tables(summary);
   for (const auto& [group, own] : by_group(records)) {
     for (const Diagram& diagram : diagrams_of(own)) {
-      ASBUILT_CHECK(io::write_file(output / fmt::format("{}_{}.svg", group, diagram.file), to_svg(diagram)));
+      ASBUILT_CHECK(io::write_file(output / fmt::format("{}_{}{}.svg", group, diagram.file, suffix), to_svg(diagram)));
       for (const Series& series : diagram.series) {
         summary["curves"][group][diagram.file][series.name] = {{"x", series.x}, {"y", series.y}};
       }
     }
   }
-  ASBUILT_CHECK(io::write_file(output / "summary.json", summary.dump(1) + "\n"));
-  ASBUILT_CHECK(io::write_file(output / "summary.md", text));
+  ASBUILT_CHECK(io::write_file(output / fmt::format("summary{}.json", suffix), summary.dump(1) + "\n"));
+  ASBUILT_CHECK(io::write_file(output / fmt::format("summary{}.md", suffix), text));
   fmt::print("{}", text);
   return {};
 }
@@ -142,6 +156,9 @@ int run(int argc, char** argv) {
   cases->add_option("--set", arguments.settings, "NAME=VALUE for any option of the product, for ablations");
   CLI::App* summary = app.add_subcommand("summary", "Figures of OUT/cases.jsonl: summary.json, summary.md, curves");
   summary->add_option("output", selection.output, "OUT")->required();
+  summary->add_option("--data", selection.data, "as for cases; --only needs it");
+  summary->add_option("--only", arguments.only, "only the distinct or the symmetric parts; writes summary_GROUP.*")
+      ->check(CLI::IsMember({"distinct", "symmetric"}));
   CLI::App* list = app.add_subcommand("parts", "Print the parts, with brute-force figures of their symmetry");
   list->add_option("--data", selection.data, "folder with cad/; else only our own parts");
   list->add_option("--group", selection.group, "distinct, symmetric or all")->capture_default_str();
@@ -149,7 +166,7 @@ int run(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
 
   const Result<void> done = cases->parsed()     ? judge_cases(arguments)
-                            : summary->parsed() ? summarise(selection.output)
+                            : summary->parsed() ? summarise(arguments)
                                                 : describe_parts(arguments);
   if (done) return 0;
   fmt::print(stderr, "asbuilt_detection: {}\n", done.error().message);
