@@ -51,6 +51,7 @@ struct PreparedModel {
   double sampling_distance = 0.0;             ///< d = tau * diameter
   PointCloud samples;        ///< even (blue-noise) oriented samples, spacing about d; normals fitted over radius ~d
   PointCloud dense_samples;  ///< the same at about d / 3 (at most 60 000), face normals
+  double dense_sample_area_mm2 = 0.0;  ///< of the skin, per dense sample
   std::shared_ptr<const SurfaceDistance> surface;
   std::shared_ptr<const DistanceField> field;
   std::shared_ptr<const RayScene> rays;

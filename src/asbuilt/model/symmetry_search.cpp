@@ -85,7 +85,7 @@ struct SelfMatching::Implementation {
       : model(the_model),
         tree(the_model.dense_samples.positions),
         tolerance(static_cast<float>(kTolerance * the_model.diameter)),
-        area_each(surface_area(the_model.skin) / static_cast<double>(the_model.dense_samples.size())) {
+        area_each(the_model.dense_sample_area_mm2) {
     lateral = 1.5F * static_cast<float>(std::sqrt(area_each));
   }
 

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace asbuilt::verify {
 namespace {
 
-constexpr double kGrazing = 0.2;        // as in the evidence: flatter surfaces return too little
 constexpr double kClearlyNearer = 0.5;  // of the distance that counts as on the model
 
 class Contrast {
@@ -26,9 +26,9 @@ class Contrast {
       const double apart = distance_at(other_from_own * samples.positions[i]);
       if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
-      const double cosine = cosine_to_sensor(scan_from_own, point, samples.normals[i], samples.positions[i]);
-      if (cosine < kGrazing) continue;
-      const double verdict = verdict_on(point, cosine, own_from_scan, other_from_scan);
+      const auto cosine = cosine_to_sensor(scan_from_own, point, samples.positions[i], samples.normals[i]);
+      if (!cosine) continue;
+      const double verdict = verdict_on(point, *cosine, own_from_scan, other_from_scan);
       (verdict > 0.0 ? for_own : for_other) += std::abs(verdict) * weight_;
     }
   }
@@ -42,18 +42,14 @@ class Contrast {
     return distance_at(Eigen::Vector3f(point.cast<float>()));
   }
 
-  // 0 where the part itself is in the way. Without a viewpoint every sample may be visible.
-  [[nodiscard]] double cosine_to_sensor(const Pose& scan_from_model, const Eigen::Vector3d& point_in_scan,
-                                        const Eigen::Vector3f& normal, const Eigen::Vector3f& point) const {
-    if (!scan_.scan.viewpoint.known()) return 1.0;
-    const Eigen::Vector3d towards =
-        scan_from_model.linear().transpose() * scan_.scan.viewpoint.towards_sensor(point_in_scan);
-    const double side = model_.is_open() && normal.cast<double>().dot(towards) < 0.0 ? -1.0 : 1.0;
-    const double cosine = side * normal.cast<double>().dot(towards);
-    if (cosine < kGrazing) return 0.0;
-    const double lift = 1e-3 * model_.diameter;
-    const Eigen::Vector3d start = point.cast<double>() + side * lift * normal.cast<double>();
-    return model_.rays->is_blocked(start, towards, lift, 2.0 * model_.diameter) ? 0.0 : cosine;
+  // Without a viewpoint every sample may be visible.
+  [[nodiscard]] std::optional<double> cosine_to_sensor(const Pose& scan_from_model,
+                                                       const Eigen::Vector3d& point_in_scan,
+                                                       const Eigen::Vector3f& point,
+                                                       const Eigen::Vector3f& normal) const {
+    const scan::Viewpoint& viewpoint = scan_.scan.viewpoint;
+    if (!viewpoint.known()) return 1.0;
+    return cosine_if_seen(scan_from_model, point, normal, viewpoint.towards_sensor(point_in_scan), model_);
   }
 
   // 1 for the pose that puts a sample here, -1 for the other, 0 if the scan does not tell.
@@ -85,8 +81,8 @@ class Contrast {
 }  // namespace
 
 double measurements_per_sample(const model::PreparedModel& model, const scan::Scan& scan) {
-  const double area_mm2 = surface_area(model.skin) / static_cast<double>(model.dense_samples.size());
-  return scan.spacing_mm > 0.0 ? std::min(1.0, area_mm2 / (scan.spacing_mm * scan.spacing_mm)) : 1.0;
+  const double square_mm2 = scan.spacing_mm * scan.spacing_mm;
+  return square_mm2 > 0.0 ? std::min(1.0, model.dense_sample_area_mm2 / square_mm2) : 1.0;
 }
 
 PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan, const model::PreparedModel& model,

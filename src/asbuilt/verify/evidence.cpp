@@ -13,8 +13,6 @@ namespace {
 
 using Evidence = scan::DepthImage::Evidence;
 
-constexpr double kGrazing = 0.2;  // surfaces seen flatter than this (78 degrees) return too little to be asked for
-
 double ratio(double part, double whole) { return whole > 0.0 ? part / whole : 0.0; }
 
 scan::Scan without(const scan::Scan& scan, const std::vector<std::uint8_t>& background) {
@@ -74,9 +72,10 @@ class Judge {
     sum.explained_anywhere += is_there ? 1 : 0;
     const Eigen::Vector3d towards =
         scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
-    const float side = model_.is_open() && normal.dot(towards) < 0.0 ? -1.0F : 1.0F;  // of a sheet, that it may see
-    const double cosine = static_cast<double>(side) * normal.dot(towards);
-    if (cosine < kGrazing || is_behind_part(point_in_model, side * normal_in_model, towards)) return;
+    const std::optional<double> seen =
+        cosine_if_seen(scan_from_model_, point_in_model, normal_in_model, towards, model_);
+    if (!seen) return;
+    const double cosine = *seen;
     sum.facing += cosine;
     ++sum.facing_samples;
     if (is_there) {
@@ -114,14 +113,6 @@ class Judge {
     if (!nearest.found()) return false;
     const Eigen::Vector3d offset = scan_.foreground.cloud.positions[nearest.index].cast<double>() - point;
     return std::abs(offset.dot(normal)) <= options_.distance_mm;
-  }
-
-  [[nodiscard]] bool is_behind_part(const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
-                                    const Eigen::Vector3d& towards_in_scan) const {
-    const double lift = 1e-3 * model_.diameter;
-    const Eigen::Vector3d start = point.cast<double>() + lift * normal.cast<double>();
-    const Eigen::Vector3d towards = scan_from_model_.linear().transpose() * towards_in_scan;
-    return model_.rays->is_blocked(start, towards, lift, 2.0 * model_.diameter);
   }
 
   Pose scan_from_model_;
@@ -165,6 +156,21 @@ ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::ui
       foreground(without(the_scan, the_background)),
       foreground_tree(foreground.cloud.positions) {
   if (scan.viewpoint.known()) depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
+}
+
+std::optional<double> cosine_if_seen(const Pose& scan_from_model, const Eigen::Vector3f& point_in_model,
+                                     const Eigen::Vector3f& normal_in_model, const Eigen::Vector3d& towards_sensor,
+                                     const model::PreparedModel& model) {
+  const Eigen::Vector3d normal = normal_in_model.cast<double>();
+  const double along = (scan_from_model.linear() * normal).dot(towards_sensor);
+  const double side = model.is_open() && along < 0.0 ? -1.0 : 1.0;  // of a sheet, that it may see
+  const double cosine = side * along;
+  if (cosine < kGrazing) return std::nullopt;
+  const double lift = 1e-3 * model.diameter;
+  const Eigen::Vector3d start = point_in_model.cast<double>() + side * lift * normal;
+  const Eigen::Vector3d towards = scan_from_model.linear().transpose() * towards_sensor;
+  if (model.rays->is_blocked(start, towards, lift, 2.0 * model.diameter)) return std::nullopt;
+  return cosine;
 }
 
 double PoseEvidence::score() const {

@@ -29,6 +29,17 @@ struct ScanEvidence {
   std::optional<scan::DepthImage> depth;  ///< of all points, if the viewpoint is known
 };
 
+/// Surfaces seen flatter than this cosine of the incidence (78 degrees) return too little to be asked for.
+inline constexpr double kGrazing = 0.2;
+
+/// Cosine of the incidence at which the sensor looks on a sample of the model; nothing if it is averted or grazing, or
+/// if the part itself is in the way. Open skins are seen from either side. `towards_sensor` is a unit vector in the
+/// scan.
+[[nodiscard]] std::optional<double> cosine_if_seen(const Pose& scan_from_model, const Eigen::Vector3f& point_in_model,
+                                                   const Eigen::Vector3f& normal_in_model,
+                                                   const Eigen::Vector3d& towards_sensor,
+                                                   const model::PreparedModel& model);
+
 /// What became of the model samples that ought to be visible at a pose. Each counts with the cosine of its incidence,
 /// the area that it shows to the sensor: what is seen edge-on returns little and proves little.
 struct PoseEvidence {

@@ -12,7 +12,6 @@ constexpr int kDirections = 8;          // around a sample
 constexpr double kAway = 0.6;           // of the reach: a surface that far off does not go on there
 constexpr double kLateral = 0.45;       // of the reach: where a measurement must lie to say that it does
 constexpr float kSameDirection = 0.9F;  // cosine between the normals of one surface
-constexpr double kGrazing = 0.2;
 
 // A point of the scan on the plane through `place` across `normal`, no farther along it than `lateral_mm`.
 bool has_plane(const Eigen::Vector3d& place, const Eigen::Vector3d& normal, double lateral_mm, double across_mm,

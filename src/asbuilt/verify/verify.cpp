@@ -225,9 +225,12 @@ class Verification {
     PoseEvidence evidence = judged_densely();
     const bool is_loose = candidate.weakest_direction < options_.min_weakest_direction;
     if (!options_.paper_mode && is_loose && candidate.score >= kPlausible * options_.acceptance_score) {
-      candidate.model_from_scan = settled_between_edges(candidate.model_from_scan, evidence, model_,
-                                                        options_.min_weakest_direction, evidence_, options);
-      evidence = judged_densely();
+      const Pose settled = settled_between_edges(candidate.model_from_scan, evidence, model_,
+                                                 options_.min_weakest_direction, evidence_, options);
+      if (settled.matrix() != candidate.model_from_scan.matrix()) {
+        candidate.model_from_scan = settled;
+        evidence = judged_densely();
+      }
     }
     candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
     if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
