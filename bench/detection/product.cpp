@@ -68,16 +68,19 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
   if (const auto contradiction = pipeline::size_contradiction(*scan, prepared.model, options)) {
     return note_failure(record, verify::code_of(verify::Reason::scan_too_small), *contradiction), Result<void>{};
   }
+  const model::PreparedModel& model = prepared.model;
+  detect::SampledScan sampled;
   std::vector<detect::Hypothesis> hypotheses;
   {
     const Timed timed(record.detect);
-    ASBUILT_TRY(found, detect::find_hypotheses(*scan, *prepared.codebook, options.detect, context));
+    sampled = detect::sampled_scan(*scan, model.sampling_distance, model.diameter, context);
+    ASBUILT_TRY(found, detect::find_hypotheses(*scan, sampled, *prepared.codebook, options.detect, context));
     hypotheses = std::move(found);
   }
   Result<verify::Detection> detection;
   {
     const Timed timed(record.verify);
-    detection = verify::verify(*scan, prepared.model, hypotheses, options.verify, context);
+    detection = verify::verify(*scan, model, hypotheses, options.verify, context, false, {}, &sampled);
   }
   if (!detection) return tl::unexpected(detection.error());
   note(record, *detection);

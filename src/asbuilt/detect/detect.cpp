@@ -7,7 +7,6 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/random.h"
-#include "asbuilt/detect/large_planes.h"
 
 namespace asbuilt::detect {
 namespace {
@@ -37,25 +36,30 @@ std::vector<Hypothesis> hypotheses_of(const std::vector<Peak>& peaks, const Code
 
 Scene detection_scene(const scan::Scan& scan, const Codebook& codebook, const DetectOptions& options,
                       const Context& context) {
-  const double d = codebook.sampling_distance;
-  Scene scene{downsample(scan, d, d, context), scan.viewpoint, scan.normals_oriented};
-  if (options.paper_mode) return scene;
-  const std::vector<std::uint8_t> excluded =
-      on_large_planes(scene.samples, d, kLargestExtentRatio * codebook.diameter, context);
-  PointCloud remaining;
-  for (std::size_t i = 0; i < scene.samples.size(); ++i) {
-    if (excluded[i] != 0) continue;
-    remaining.positions.push_back(scene.samples.positions[i]);
-    remaining.normals.push_back(scene.samples.normals[i]);
+  return detection_scene(scan, sampled_scan(scan, codebook.sampling_distance, codebook.diameter, context), options);
+}
+
+Scene detection_scene(const scan::Scan& scan, const SampledScan& sampled, const DetectOptions& options) {
+  Scene scene{{}, scan.viewpoint, scan.normals_oriented};
+  for (std::size_t i = 0; i < sampled.samples.size(); ++i) {
+    if (!options.paper_mode && sampled.on_large_plane[i] != 0) continue;
+    scene.samples.positions.push_back(sampled.samples.positions[i]);
+    scene.samples.normals.push_back(sampled.samples.normals[i]);
   }
-  scene.samples = std::move(remaining);
   return scene;
 }
 
 Result<std::vector<Hypothesis>> find_hypotheses(const scan::Scan& scan, const Codebook& codebook,
                                                 const DetectOptions& options, const Context& context) {
+  return find_hypotheses(scan, sampled_scan(scan, codebook.sampling_distance, codebook.diameter, context), codebook,
+                         options, context);
+}
+
+Result<std::vector<Hypothesis>> find_hypotheses(const scan::Scan& scan, const SampledScan& sampled,
+                                                const Codebook& codebook, const DetectOptions& options,
+                                                const Context& context) {
   ASBUILT_CHECK(options.validate());
-  const Scene scene = detection_scene(scan, codebook, options, context);
+  const Scene scene = detection_scene(scan, sampled, options);
   const std::vector<std::uint32_t> references = reference_points(scene.samples.size(), options.reference_points);
   // Without a known sign both sides of the reference are tried.
   const std::size_t signs = scene.normals_oriented ? 1 : 2;

@@ -79,21 +79,25 @@ std::vector<std::uint8_t> on_large_planes(const PointCloud& samples, double spac
   return marks;
 }
 
-std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, double spacing_mm, double largest_extent_mm,
+SampledScan sampled_scan(const scan::Scan& scan, double spacing_mm, double diameter_mm, const Context& context) {
+  SampledScan sampled{scan::downsample(scan, spacing_mm, spacing_mm, context), spacing_mm, {}};
+  sampled.on_large_plane = on_large_planes(sampled.samples, spacing_mm, kLargestExtentRatio * diameter_mm, context);
+  return sampled;
+}
+
+std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, const SampledScan& sampled,
                                                  const Context& context) {
-  const PointCloud samples = scan::downsample(scan, spacing_mm, spacing_mm, context);
-  const std::vector<std::uint8_t> excluded = on_large_planes(samples, spacing_mm, largest_extent_mm, context);
   PointCloud planes;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (excluded[i] == 0) continue;
-    planes.positions.push_back(samples.positions[i]);
-    planes.normals.push_back(samples.normals[i]);
+  for (std::size_t i = 0; i < sampled.samples.size(); ++i) {
+    if (sampled.on_large_plane[i] == 0) continue;
+    planes.positions.push_back(sampled.samples.positions[i]);
+    planes.normals.push_back(sampled.samples.normals[i]);
   }
   std::vector<std::uint8_t> marks(scan.cloud.size(), 0);
   if (planes.empty()) return marks;
   const KdTree tree(planes.positions);
-  const auto reach = static_cast<float>(1.5 * spacing_mm);
-  const auto height = static_cast<float>(4.0 * scan.noise_sigma_mm + 0.02 * spacing_mm);
+  const auto reach = static_cast<float>(1.5 * sampled.spacing_mm);
+  const auto height = static_cast<float>(4.0 * scan.noise_sigma_mm + 0.02 * sampled.spacing_mm);
   constexpr float kAgreeing = 0.9F;
   parallel_for(context, scan.cloud.size(), 2048, [&](std::size_t i) {
     const KdTree::Neighbour nearest = tree.nearest(scan.cloud.positions[i], reach);

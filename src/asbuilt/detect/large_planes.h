@@ -18,8 +18,18 @@ inline constexpr double kLargestExtentRatio = 1.1;
 [[nodiscard]] std::vector<std::uint8_t> on_large_planes(const PointCloud& samples, double spacing_mm,
                                                         double largest_extent_mm, const Context& context);
 
-/// The same for every point of a scan: 1 where it lies on such a plane.
-[[nodiscard]] std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, double spacing_mm,
-                                                               double largest_extent_mm, const Context& context);
+/// A scan as detection and verification both look at it.
+struct SampledScan {
+  PointCloud samples;                        ///< even, at the model's sampling distance
+  double spacing_mm = 0.0;                   ///< that distance
+  std::vector<std::uint8_t> on_large_plane;  ///< one a sample: 1 where it lies on a plane too large for the part
+};
+
+[[nodiscard]] SampledScan sampled_scan(const scan::Scan& scan, double spacing_mm, double diameter_mm,
+                                       const Context& context);
+
+/// The marks of the samples carried over to every point of the scan.
+[[nodiscard]] std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, const SampledScan& sampled,
+                                                               const Context& context);
 
 }  // namespace asbuilt::detect

@@ -155,12 +155,13 @@ Result<verify::Detection> accept_for_user(const verify::Detection& detection, in
 /// The one placement, or all of them, as the user wants.
 Result<std::vector<verify::Detection>> placements_in(const scan::Scan& scan,
                                                      const std::vector<detect::Hypothesis>& hypotheses,
-                                                     const ScanHalf& half, const Context& context) {
+                                                     const ScanHalf& half, const detect::SampledScan& sampled,
+                                                     const Context& context) {
   const model::PreparedModel& model = half.model.prepared;
   if (half.options.instances == Instances::all) {
-    return verify::verify_instances(scan, model, hypotheses, half.options.verify, context);
+    return verify::verify_instances(scan, model, hypotheses, half.options.verify, context, &sampled);
   }
-  ASBUILT_TRY(detection, verify::verify(scan, model, hypotheses, half.options.verify, context));
+  ASBUILT_TRY(detection, verify::verify(scan, model, hypotheses, half.options.verify, context, false, {}, &sampled));
   return std::vector<verify::Detection>{std::move(detection)};
 }
 
@@ -183,16 +184,19 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     return std::vector<JudgedScan>{std::move(judged)};
   }
 
+  const model::PreparedModel& model = half.model.prepared;
+  detect::SampledScan sampled;
   Result<std::vector<detect::Hypothesis>> hypotheses;
   {
     const auto timed = folder.stage("detect", file.name);
-    hypotheses = detect::find_hypotheses(*scan, half.codebook, half.options.detect, context);
+    sampled = detect::sampled_scan(*scan, model.sampling_distance, model.diameter, context);
+    hypotheses = detect::find_hypotheses(*scan, sampled, half.codebook, half.options.detect, context);
   }
   if (!hypotheses) return tl::unexpected(hypotheses.error());
 
   const auto timed = folder.stage("verify", file.name);
   const auto starts = with_starts(std::move(*hypotheses), file, half.starts);
-  ASBUILT_TRY(placements, placements_in(*scan, starts, half, context));
+  ASBUILT_TRY(placements, placements_in(*scan, starts, half, sampled, context));
   ASBUILT_CHECK(check_acceptances(file, placements.size(), half.options));
   bool chosen_by_user = false;
   for (std::size_t i = 0; i < placements.size(); ++i) {

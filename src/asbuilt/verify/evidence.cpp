@@ -68,7 +68,8 @@ class Judge {
     ++sum.samples;
     const Eigen::Vector3d point = scan_from_model_ * point_in_model.cast<double>();
     const Eigen::Vector3d normal = scan_from_model_.linear() * normal_in_model.cast<double>();
-    const bool is_there = has_surface(point, normal);
+    const KdTree::Neighbour measured = surface_at(point, normal);
+    const bool is_there = measured.found();
     sum.explained_anywhere += is_there ? 1 : 0;
     const Eigen::Vector3d towards =
         scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
@@ -81,6 +82,8 @@ class Judge {
     if (is_there) {
       sum.explained += cosine;
       ++sum.explained_samples;
+      // A face whose place another surface fills, the wall beside an edge, holds nothing.
+      if (!is_turned_alike(measured, normal)) return;
       const Eigen::Vector3d lever = (point_in_model.cast<double>() - centre_) / (0.5 * model_.diameter);
       Vector6d row;
       row << lever.cross(normal_in_model.cast<double>()), normal_in_model.cast<double>();
@@ -107,12 +110,19 @@ class Judge {
   }
 
  private:
-  [[nodiscard]] bool has_surface(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+  // The scan point that shows a sample's surface; none if the surface is not there.
+  [[nodiscard]] KdTree::Neighbour surface_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
     const auto reach = static_cast<float>(std::hypot(options_.distance_mm, options_.lateral_mm));
     const KdTree::Neighbour nearest = scan_.foreground_tree.nearest(point.cast<float>(), reach);
-    if (!nearest.found()) return false;
+    if (!nearest.found()) return nearest;
     const Eigen::Vector3d offset = scan_.foreground.cloud.positions[nearest.index].cast<double>() - point;
-    return std::abs(offset.dot(normal)) <= options_.distance_mm;
+    return std::abs(offset.dot(normal)) <= options_.distance_mm ? nearest : KdTree::Neighbour{};
+  }
+
+  [[nodiscard]] bool is_turned_alike(const KdTree::Neighbour& measured, const Eigen::Vector3d& normal) const {
+    constexpr double kAlike = 0.5;  // cosine; normals of noisy and narrow surfaces are no better known
+    const double cosine = scan_.foreground.cloud.normals[measured.index].cast<double>().dot(normal);
+    return std::abs(cosine) >= kAlike;
   }
 
   Pose scan_from_model_;
@@ -202,6 +212,43 @@ PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples
   const std::size_t count = std::min(options.most_samples, samples.size());
   for (std::size_t i = 0; i < count; ++i) judge.add(samples.positions[i], samples.normals[i], sum);
   return sum;
+}
+
+double share_within(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
+                    const model::PreparedModel& model, double distance_mm) {
+  const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
+  const Eigen::Vector3f translation = model_from_scan.translation().cast<float>();
+  std::size_t on = 0, within = 0;
+  for (const Eigen::Vector3f& point : points_in_scan) {
+    const model::DistanceField::Sample sample = model.field->at(rotation * point + translation);
+    if (!sample.known()) continue;
+    on += std::abs(sample.distance) <= distance_mm ? 1 : 0;
+    within += sample.distance < -2.0 * distance_mm ? 1 : 0;
+  }
+  return ratio(static_cast<double>(within), static_cast<double>(on + within));
+}
+
+double share_seen_from_behind(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
+                              const model::PreparedModel& model, const ScanEvidence& scan,
+                              const EvidenceOptions& options) {
+  const Eigen::Vector3d towards = mean_direction(model_from_scan, model, scan, options.distance_mm);
+  if (towards.isZero(0.0)) return 0.0;
+  using scan::Viewpoint;
+  const std::vector<Eigen::Vector3f>& all = scan.scan.cloud.positions;
+  const scan::DepthImage front(all, scan.scan.spacing_mm, Viewpoint{Viewpoint::Kind::direction, -towards});
+  const scan::DepthImage back(all, scan.scan.spacing_mm, Viewpoint{Viewpoint::Kind::direction, towards});
+  const double tolerance = options.distance_mm + options.lateral_mm;
+  std::size_t on = 0, hidden_in_front = 0, hidden_at_back = 0;
+  for (const Eigen::Vector3f& point : points_in_scan) {
+    const Eigen::Vector3d in_scan = point.cast<double>();
+    const Eigen::Vector3d in_model = model_from_scan * in_scan;
+    if (!(std::abs(model.field->at(in_model.cast<float>()).distance) <= options.distance_mm)) continue;
+    ++on;
+    hidden_in_front += front.hides(in_scan, tolerance) ? 1 : 0;
+    hidden_at_back += back.hides(in_scan, tolerance) ? 1 : 0;
+  }
+  return std::max(0.0, ratio(static_cast<double>(hidden_in_front), static_cast<double>(on)) -
+                           ratio(static_cast<double>(hidden_at_back), static_cast<double>(on)));
 }
 
 double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,

@@ -80,6 +80,19 @@ struct EvidenceOptions {
                                         const model::PreparedModel& model, const ScanEvidence& scan,
                                         const EvidenceOptions& options);
 
+/// Of the scan points on the model and within it, the share that lies deeper under its surface than the doubled
+/// distance: no sensor measures inside a solid. What takes the place of the rays where the viewpoint is unknown.
+[[nodiscard]] double share_within(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
+                                  const model::PreparedModel& model, double distance_mm);
+
+/// By how much more of the scan points on the model hide behind the rest of the scan when they are looked at from the
+/// side to which the pose turns them than from the other. A mirror image, seen from within, shows the part's own
+/// surface; what else is in the scan tells where the sensor stood. 0 if nothing else is, never negative.
+[[nodiscard]] double share_seen_from_behind(const Pose& model_from_scan,
+                                            std::span<const Eigen::Vector3f> points_in_scan,
+                                            const model::PreparedModel& model, const ScanEvidence& scan,
+                                            const EvidenceOptions& options);
+
 struct NormalOptions {
   double distance_mm = 1.0;  ///< tau_theta: points this close are on the model
   double max_angle = 0.5;    ///< radians up to which two normals agree

@@ -57,11 +57,12 @@ double distance_mm(const scan::Scan& scan, std::uint32_t point, const Detection&
 
 Result<std::vector<Detection>> verify_instances(const scan::Scan& scan, const model::PreparedModel& model,
                                                 std::span<const detect::Hypothesis> hypotheses,
-                                                const VerifyOptions& options, const Context& context) {
+                                                const VerifyOptions& options, const Context& context,
+                                                const detect::SampledScan* sampled) {
   std::vector<Placement> placements;
   std::vector<std::uint8_t> taken(scan.cloud.size(), 0);
   while (placements.size() < kMostInstances) {
-    ASBUILT_TRY(detection, verify(scan, model, hypotheses, options, context, false, taken));
+    ASBUILT_TRY(detection, verify(scan, model, hypotheses, options, context, false, taken, sampled));
     const bool rejected = detection.status == Status::rejected;
     const bool is_further = !placements.empty();
     if (is_further && (rejected || !is_comparable(detection.best, placements.front().detection.best))) break;

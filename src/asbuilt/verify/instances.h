@@ -21,10 +21,12 @@ namespace asbuilt::verify {
 /// the best. A rival elsewhere that finds no points of its own explains those of another placement, which is then
 /// ambiguous, as it is among poses in one place.
 ///
-/// A point of the scan belongs to at most one segment: that of the placement whose surface it lies nearest to.
+/// `sampled`, if it is at hand, is the scan as detection looked at it. A point of the scan belongs to at most one
+/// segment: that of the placement whose surface it lies nearest to.
 [[nodiscard]] Result<std::vector<Detection>> verify_instances(const scan::Scan& scan, const model::PreparedModel& model,
                                                               std::span<const detect::Hypothesis> hypotheses,
-                                                              const VerifyOptions& options, const Context& context);
+                                                              const VerifyOptions& options, const Context& context,
+                                                              const detect::SampledScan* sampled = nullptr);
 
 /// Takes from each segment the points that lie nearer to the surface of another placement; equal distances go to the
 /// better one. What a segment loses becomes its margin.

@@ -16,6 +16,16 @@ namespace {
 
 constexpr int kLoosest = 3;  // directions that are tried: those of a plane
 
+// Of the part's surface, to first order, for a unit twist about the centre of its box.
+double largest_motion_mm(const Vector6d& twist, const model::PreparedModel& model) {
+  const Eigen::Vector3d centre = model.box.center(), turn = twist.head<3>(), shift = twist.tail<3>();
+  double largest = 0.0;
+  for (const Eigen::Vector3f& sample : model.samples.positions) {
+    largest = std::max(largest, (turn.cross(sample.cast<double>() - centre) + shift).squaredNorm());
+  }
+  return std::sqrt(largest);
+}
+
 // Both ways along those of the loosest directions that hold less than `below` of information.
 std::vector<Pose> slips(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
                         double slip_mm, double below) {
@@ -30,7 +40,7 @@ std::vector<Pose> slips(const Pose& model_from_scan, const PoseEvidence& evidenc
   for (int k = 0; k < kLoosest && solver.eigenvalues()[k] < below; ++k) {
     Vector6d twist = solver.eigenvectors().col(k);
     twist.head<3>() /= 0.5 * model.diameter;  // the evidence measures rotations by the motion at half a diameter
-    const double unit = displacement_mm(stepped(model_from_scan, 1e-3 * twist, centre), model_from_scan, model) / 1e-3;
+    const double unit = largest_motion_mm(twist, model);
     if (!(unit > 0.0)) continue;
     for (const double sign : {-1.0, 1.0}) {
       slipped.push_back(stepped(model_from_scan, sign * slip_mm / unit * twist, centre));
@@ -42,8 +52,8 @@ std::vector<Pose> slips(const Pose& model_from_scan, const PoseEvidence& evidenc
 }  // namespace
 
 std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                const model::PreparedModel& model, double slip_mm) {
-  return slips(model_from_scan, evidence, model, slip_mm, std::numeric_limits<double>::infinity());
+                                const model::PreparedModel& model, double min_held, double slip_mm) {
+  return slips(model_from_scan, evidence, model, slip_mm, min_held * static_cast<double>(evidence.explained_samples));
 }
 
 Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
@@ -51,13 +61,12 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
   constexpr double kSteps[] = {0.03, 0.015, 0.0075};  // of the diameter
   constexpr int kMostMoves = 4;                       // of each
   constexpr double kLeastGain = 2.0;                  // measurements
-  const double below = min_held * static_cast<double>(evidence.explained_samples);
   Pose settled = model_from_scan;
   for (const double step : kSteps) {
     for (int move = 0; move < kMostMoves; ++move) {
       const Pose here = settled;
       double most = kLeastGain;
-      for (const Pose& slipped : slips(here, evidence, model, step * model.diameter, below)) {
+      for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter)) {
         const PoseContrast seen = contrast(here, slipped, model, scan, options);
         if (seen.for_second - seen.for_first <= most) continue;
         most = seen.for_second - seen.for_first;
@@ -70,10 +79,10 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
 }
 
 double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
-                             const model::PreparedModel& model, double slip_mm, const ScanEvidence& scan,
-                             const EvidenceOptions& options) {
+                             const model::PreparedModel& model, double min_held, double slip_mm,
+                             const ScanEvidence& scan, const EvidenceOptions& options) {
   double least = std::numeric_limits<double>::infinity();
-  for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, slip_mm)) {
+  for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, min_held, slip_mm)) {
     const PoseContrast seen = contrast(model_from_scan, slipped, model, scan, options);
     least = std::min(least, seen.for_first - seen.for_second);
   }

@@ -9,15 +9,15 @@
 
 namespace asbuilt::verify {
 
-/// The poses into which a part can slip most easily: both ways along the loosest directions of the surface that was
-/// found (the eigenvectors of PoseEvidence::information with the smallest eigenvalues), each moving the farthest corner
-/// of the model's box by `slip_mm`. Turns that the part's symmetry allows are no slips.
+/// The poses into which a part can slip: both ways along each loose direction of the surface that was found (the
+/// eigenvectors of PoseEvidence::information with less than `min_held` per explained sample, at most three), each
+/// moving the surface by `slip_mm` where it moves most. Turns that the part's symmetry allows are no slips.
 [[nodiscard]] std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                              const model::PreparedModel& model, double slip_mm);
+                                              const model::PreparedModel& model, double min_held, double slip_mm);
 
-/// The pose moved along its loose directions (as above; less than `min_held` of information per explained sample) for
-/// as long as the scan prefers the slipped pose, in steps of 3 % of the diameter and less. A surface without its edges
-/// leaves registration free to drift there; the edges are asked here.
+/// The pose moved along its loose directions (as above) for as long as the scan prefers the slipped pose, in steps of 3
+/// % of the diameter and less. A surface without its edges leaves registration free to drift there; the edges are asked
+/// here.
 [[nodiscard]] Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence,
                                          const model::PreparedModel& model, double min_held, const ScanEvidence& scan,
                                          const EvidenceOptions& options);
@@ -25,7 +25,7 @@ namespace asbuilt::verify {
 /// By how many measurements a pose leads over the slipped pose that comes closest to it (see contrast()). Sees what
 /// eigenvalues do not: that the sensor looked past the edge at which the part ends. Negative if a slip would be better.
 [[nodiscard]] double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                           const model::PreparedModel& model, double slip_mm, const ScanEvidence& scan,
-                                           const EvidenceOptions& options);
+                                           const model::PreparedModel& model, double min_held, double slip_mm,
+                                           const ScanEvidence& scan, const EvidenceOptions& options);
 
 }  // namespace asbuilt::verify

@@ -13,7 +13,6 @@
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/random.h"
 #include "asbuilt/core/voxel_grid.h"
-#include "asbuilt/detect/large_planes.h"
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/evidence.h"
 #include "asbuilt/verify/lm_icp.h"
@@ -61,10 +60,12 @@ double score_distance(const scan::Scan& scan, const model::PreparedModel& model,
 
 // Floors, walls and tables larger than the part would lend their points to any flat face of it.
 std::vector<std::uint8_t> background(const scan::Scan& scan, const model::PreparedModel& model,
-                                     const VerifyOptions& options, const Context& context) {
+                                     const VerifyOptions& options, const Context& context,
+                                     const detect::SampledScan* sampled) {
   if (options.paper_mode) return std::vector<std::uint8_t>(scan.cloud.size(), 0);
-  return detect::points_on_large_planes(scan, model.sampling_distance, detect::kLargestExtentRatio * model.diameter,
-                                        context);
+  if (sampled != nullptr) return detect::points_on_large_planes(scan, *sampled, context);
+  return detect::points_on_large_planes(
+      scan, detect::sampled_scan(scan, model.sampling_distance, model.diameter, context), context);
 }
 
 std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<std::uint8_t> background) {
@@ -142,12 +143,12 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const mod
 class Verification {
  public:
   Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
-               const Context& context, std::span<const std::uint8_t> taken)
+               const Context& context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled)
       : scan_(scan),
         model_(model),
         options_(options),
         context_(context),
-        background_(background(scan, model, options, context)),
+        background_(background(scan, model, options, context, sampled)),
         evidence_(scan, with(taken, background_)),
         measurements_per_sample_(measurements_per_sample(model, scan)),
         final_distance_(score_distance(scan, model, options)),
@@ -232,13 +233,15 @@ class Verification {
         evidence = judged_densely();
       }
     }
+    if (!options_.paper_mode && !scan_.viewpoint.known() && !model_.is_open()) judge_without_rays(candidate);
     candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
     if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
       candidate.slip_lead = std::numeric_limits<double>::infinity();
       for (const double slip : kSlips) {
         candidate.slip_lead =
-            std::min(candidate.slip_lead, least_lead_over_slips(candidate.model_from_scan, evidence, model_,
-                                                                slip * model_.diameter, evidence_, options));
+            std::min(candidate.slip_lead,
+                     least_lead_over_slips(candidate.model_from_scan, evidence, model_, options_.min_weakest_direction,
+                                           slip * model_.diameter, evidence_, options));
       }
     }
     candidate.overrun_share =
@@ -299,6 +302,20 @@ class Verification {
 
   // Walls turned away from the sensor hold no points; a sheet has no such side.
   [[nodiscard]] bool only_facing() const { return !options_.paper_mode && !model_.is_open(); }
+
+  // Without a viewpoint no ray can contradict a pose, but points inside the solid do, and those that the sensor would
+  // have to have seen through others.
+  void judge_without_rays(Candidate& candidate) const {
+    constexpr std::size_t kMostPoints = 8000;
+    constexpr double kDepth = 0.1;  // of the diameter, how far from the surface points are asked
+    const std::vector<Eigen::Vector3f> around =
+        points_around(shuffled_foreground_, candidate.model_from_scan, model_, kDepth * model_.diameter, kMostPoints);
+    const Pose& pose = candidate.model_from_scan;
+    const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    const double denied = share_within(pose, around, model_, final_distance_) +
+                          share_seen_from_behind(pose, around, model_, evidence_, options);
+    candidate.contradiction_share = std::max(candidate.contradiction_share, denied);
+  }
 
   // The published judge asks every point; ours those whose normals mean something, and passes where there are none.
   void judge_normals(Candidate& candidate) const {
@@ -367,7 +384,8 @@ Result<void> VerifyOptions::validate() const {
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                          std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
-                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken) {
+                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken,
+                         const detect::SampledScan* sampled) {
   ASBUILT_EXPECT(taken.empty() || taken.size() == scan.cloud.size(), "one byte a point of the scan");
   ASBUILT_CHECK(options.validate());
   std::vector<Candidate> candidates;
@@ -377,7 +395,7 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidate.votes = hypothesis.votes;
     candidates.push_back(candidate);
   }
-  const Verification verification(scan, model, options, context, taken);
+  const Verification verification(scan, model, options, context, taken, sampled);
   candidates = verification.with_near_poses(verification.coarse_to_fine(std::move(candidates)));
   parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
     if (!context.cancelled()) verification.register_densely(candidates[i]);

@@ -80,10 +80,11 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
 ///
 /// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong to
 /// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the
-/// caller.
+/// caller. `sampled`, if it is at hand, is the scan as detection looked at it.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                                        std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
                                        const Context& context, bool accept_anyway = false,
-                                       std::span<const std::uint8_t> taken = {});
+                                       std::span<const std::uint8_t> taken = {},
+                                       const detect::SampledScan* sampled = nullptr);
 
 }  // namespace asbuilt::verify
