@@ -121,6 +121,17 @@ TEST(WeakestDirection, IsZeroOnACylinder) {
   EXPECT_LT(evidence.weakest_direction(), 1e-9);
 }
 
+// A slab sunk into a wall: its sides are not there, though the wall lies close to all of them.
+TEST(WeakestDirection, AFaceInWhosePlaceAnotherSurfaceLiesHoldsNothing) {
+  const model::PreparedModel slab = test::prepared(simulate::box({300, 300, 8}));
+  const scan::Scan scan = test::seen({test::plate_at({2000, 2000, 10}, {0, 0, 805})}, 0.5);
+  const ScanEvidence seen(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+  const Pose model_from_scan(Eigen::Translation3d(-120, -90, -804));
+  const PoseEvidence evidence = evidence_for(model_from_scan, slab.dense_samples, slab, seen, {5.0, 10.0});
+  EXPECT_GT(evidence.score(), 0.99);
+  EXPECT_LT(evidence.weakest_direction(), 1e-4);
+}
+
 TEST(WeakestDirection, IsFirmWhereThreeSidesShow) {
   const TriangleMesh mesh = simulate::box({100, 80, 60});
   const Pose pose = test::pose_at(kPlace, {0.7, 0.6, 0.2});
@@ -136,6 +147,42 @@ std::pair<double, double> agreements(const scan::Scan& scan, const Pose& model_f
   const NormalOptions options{0.5, 0.5};
   return {normal_agreement(model_from_scan, scan, block(), options),
           flat_normal_agreement(model_from_scan, scan.cloud.positions, evidence, block(), options).value_or(-1.0)};
+}
+
+// A box of the same shape at 0.8 of the size lies deeper under the surface than any distance asked here.
+TEST(ShareWithin, CountsThePointsInsideTheSolid) {
+  const model::PreparedModel brick = test::prepared(simulate::box({100, 80, 60}));
+  const std::vector<Eigen::Vector3f>& on_surface = brick.dense_samples.positions;
+  const Pose place = test::pose_at(kPlace);
+  const auto in_scan = [&](float scale) {
+    std::vector<Eigen::Vector3f> points;
+    for (const Eigen::Vector3f& p : on_surface) points.push_back((place * (scale * p).cast<double>()).cast<float>());
+    return points;
+  };
+  std::vector<Eigen::Vector3f> points = in_scan(1.0F);
+  EXPECT_EQ(share_within(place.inverse(), points, brick, 1.0), 0.0);
+  for (const Eigen::Vector3f& p : in_scan(1.5F)) points.push_back(p);  // around it
+  EXPECT_EQ(share_within(place.inverse(), points, brick, 1.0), 0.0);
+  for (const Eigen::Vector3f& p : in_scan(0.8F)) points.push_back(p);
+  EXPECT_NEAR(share_within(place.inverse(), points, brick, 1.0), 0.5, 1e-9);
+}
+
+// The sensor sees a box's front; the same box one depth nearer to it would show its back there.
+TEST(ShareSeenFromBehind, TellsTheFrontOfAFaceByWhatStandsBehindIt) {
+  const Eigen::Vector3d size(100, 100, 60), where(150, 0, 500);
+  scan::Scan scan = test::seen({test::plate_at(size, where), wall()}, 0.5);
+  scan.viewpoint = {};
+  scan.normals_oriented = false;
+  const ScanEvidence seen(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+  const model::PreparedModel brick = test::prepared(simulate::box(size));
+  const auto share_at = [&](const Eigen::Vector3d& place) {
+    const Pose model_from_scan(Eigen::Translation3d(-place));
+    return share_seen_from_behind(model_from_scan, scan.cloud.positions, brick, seen, {1.0, 2.5 * scan.spacing_mm});
+  };
+  EXPECT_LT(share_at(where), 0.01);
+  // Of the front, 100 <= x <= 200, the wall hides what its shadow leaves: that begins behind the far edge of the side.
+  const double shadow_begins = 100.0 * 995.0 / 530.0;
+  EXPECT_NEAR(share_at(where - Eigen::Vector3d(0, 0, 60)), (shadow_begins - 100.0) / 100.0, 0.03);
 }
 
 TEST(NormalAgreement, IsFullAtTheTruePoseAndNoneWhenFlipped) {
