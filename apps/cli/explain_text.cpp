@@ -112,8 +112,7 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
   const auto firm = option_of(record, "min_weakest_direction");
   // Edges are asked only where the surface alone is loose.
   if (!std::isnan(best.slip_lead) && firm && best.weakest_direction < *firm) {
-    text += fmt::format("; its edges: {:.0f} measurements more than for the slip that comes closest{}", best.slip_lead,
-                        limit(record, "min_contrast", "needed: at least", 1.0, ""));
+    text += fmt::format("; its edges: {:.0f} measurements more than for the slip that comes closest", best.slip_lead);
   }
   text += ".\n";
   if (std::isnan(best.overrun_share)) return text;
