@@ -50,6 +50,7 @@ struct Candidate {
   double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;   ///< model samples that the scan confirms
   double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does
+  bool without_rays = false;            ///< the sensor's place is unknown: what it saw through cannot be asked
   Reason objection = Reason::none;      ///< what stands against it on its own, whatever its rivals
 };
 

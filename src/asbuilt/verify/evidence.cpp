@@ -233,22 +233,35 @@ double share_seen_from_behind(const Pose& model_from_scan, std::span<const Eigen
                               const EvidenceOptions& options) {
   const Eigen::Vector3d towards = mean_direction(model_from_scan, model, scan, options.distance_mm);
   if (towards.isZero(0.0)) return 0.0;
-  using scan::Viewpoint;
-  const std::vector<Eigen::Vector3f>& all = scan.scan.cloud.positions;
-  const scan::DepthImage front(all, scan.scan.spacing_mm, Viewpoint{Viewpoint::Kind::direction, -towards});
-  const scan::DepthImage back(all, scan.scan.spacing_mm, Viewpoint{Viewpoint::Kind::direction, towards});
   const double tolerance = options.distance_mm + options.lateral_mm;
-  std::size_t on = 0, hidden_in_front = 0, hidden_at_back = 0;
+  std::vector<Eigen::Vector3d> on_model;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3f& point : points_in_scan) {
     const Eigen::Vector3d in_scan = point.cast<double>();
     const Eigen::Vector3d in_model = model_from_scan * in_scan;
     if (!(std::abs(model.field->at(in_model.cast<float>()).distance) <= options.distance_mm)) continue;
-    ++on;
-    hidden_in_front += front.hides(in_scan, tolerance) ? 1 : 0;
-    hidden_at_back += back.hides(in_scan, tolerance) ? 1 : 0;
+    on_model.push_back(in_scan);
+    centre += in_scan;
   }
-  return std::max(0.0, ratio(static_cast<double>(hidden_in_front), static_cast<double>(on)) -
-                           ratio(static_cast<double>(hidden_at_back), static_cast<double>(on)));
+  if (on_model.empty()) return 0.0;
+  centre /= static_cast<double>(on_model.size());
+  const auto hidden_from = [&](const scan::Viewpoint& viewpoint) {
+    const scan::DepthImage image(scan.scan.cloud.positions, scan.scan.spacing_mm, viewpoint);
+    const auto hidden =
+        std::ranges::count_if(on_model, [&](const Eigen::Vector3d& point) { return image.hides(point, tolerance); });
+    return ratio(static_cast<double>(hidden), static_cast<double>(on_model.size()));
+  };
+  // How far away the sensor stood is not known; the share that hides wherever it stood is what speaks against a pose.
+  using scan::Viewpoint;
+  double least = std::max(
+      0.0, hidden_from({Viewpoint::Kind::direction, -towards}) - hidden_from({Viewpoint::Kind::direction, towards}));
+  for (const double diameters : {6.0, 3.0, 1.5}) {
+    if (least == 0.0) break;
+    const Eigen::Vector3d arm = diameters * model.diameter * towards;
+    least = std::min(least, std::max(0.0, hidden_from({Viewpoint::Kind::point, centre + arm}) -
+                                              hidden_from({Viewpoint::Kind::point, centre - arm})));
+  }
+  return least;
 }
 
 double normal_agreement(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,

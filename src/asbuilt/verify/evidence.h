@@ -87,7 +87,8 @@ struct EvidenceOptions {
 
 /// By how much more of the scan points on the model hide behind the rest of the scan when they are looked at from the
 /// side to which the pose turns them than from the other. A mirror image, seen from within, shows the part's own
-/// surface; what else is in the scan tells where the sensor stood. 0 if nothing else is, never negative.
+/// surface; what else is in the scan tells where the sensor stood. How far away it was is not known: the least over
+/// several distances counts. 0 if nothing else is in the scan, never negative.
 [[nodiscard]] double share_seen_from_behind(const Pose& model_from_scan,
                                             std::span<const Eigen::Vector3f> points_in_scan,
                                             const model::PreparedModel& model, const ScanEvidence& scan,

@@ -27,9 +27,11 @@ double proof(const Candidate& c) {
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn) * (1.0 - c.overrun_share);
 }
 
-// What others hide and what returned nothing can lie, so that what was found must prove the more.
+// What others hide and what returned nothing can lie, and without rays little can be refuted, so that what was found
+// must prove the more.
 double proof_needed(const Candidate& c, const VerifyOptions& options) {
-  return options.min_proof + options.hidden_surcharge * c.hidden_share + options.missing_surcharge * c.missing_share;
+  return options.min_proof + options.hidden_surcharge * c.hidden_share + options.missing_surcharge * c.missing_share +
+         (c.without_rays ? options.no_rays_surcharge : 0.0);
 }
 
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where

@@ -233,7 +233,8 @@ class Verification {
         evidence = judged_densely();
       }
     }
-    if (!options_.paper_mode && !scan_.viewpoint.known() && !model_.is_open()) judge_without_rays(candidate);
+    candidate.without_rays = !options_.paper_mode && !scan_.viewpoint.known();
+    if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
     if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
       candidate.slip_lead = std::numeric_limits<double>::infinity();
@@ -312,9 +313,9 @@ class Verification {
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, kDepth * model_.diameter, kMostPoints);
     const Pose& pose = candidate.model_from_scan;
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
-    const double denied = share_within(pose, around, model_, final_distance_) +
-                          share_seen_from_behind(pose, around, model_, evidence_, options);
-    candidate.contradiction_share = std::max(candidate.contradiction_share, denied);
+    candidate.contradiction_share =
+        std::max({candidate.contradiction_share, share_within(pose, around, model_, final_distance_),
+                  share_seen_from_behind(pose, around, model_, evidence_, options)});
   }
 
   // The published judge asks every point; ours those whose normals mean something, and passes where there are none.
@@ -376,6 +377,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
+  ASBUILT_CHECK(expect_between("no_rays_surcharge", no_rays_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));

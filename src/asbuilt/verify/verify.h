@@ -30,6 +30,7 @@ struct VerifyOptions {
   double hidden_surcharge =
       0.15;  ///< added to min_proof per share of the part that other things hide: what hides can lie
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
+  double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
   double max_overrun_share = 0.2;         ///< of the edges past which the scan's surface may go on
   double max_normal_angle_deg = 30.0;     ///< normals closer than this agree
@@ -69,6 +70,7 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("min_proof", options.min_proof, "score * normal agreement * fit that a detection needs");
   field("hidden_surcharge", options.hidden_surcharge, "added to min_proof per share of the part that is hidden");
   field("missing_surcharge", options.missing_surcharge, "likewise per share that returned nothing");
+  field("no_rays_surcharge", options.no_rays_surcharge, "likewise where the viewpoint is unknown");
   field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");

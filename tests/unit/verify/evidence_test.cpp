@@ -167,22 +167,39 @@ TEST(ShareWithin, CountsThePointsInsideTheSolid) {
   EXPECT_NEAR(share_within(place.inverse(), points, brick, 1.0), 0.5, 1e-9);
 }
 
-// The sensor sees a box's front; the same box one depth nearer to it would show its back there.
-TEST(ShareSeenFromBehind, TellsTheFrontOfAFaceByWhatStandsBehindIt) {
-  const Eigen::Vector3d size(100, 100, 60), where(150, 0, 500);
-  scan::Scan scan = test::seen({test::plate_at(size, where), wall()}, 0.5);
+// A brick before something, as seen without a viewpoint, and as claimed at two places: where it stands, and a thickness
+// nearer to the sensor, so that its back lies where its front is and the sensor would have stood on the other side.
+std::pair<double, double> seen_from_behind_at(const Eigen::Vector3d& size, const Eigen::Vector3d& place,
+                                              const TriangleMesh& behind) {
+  scan::Scan scan = test::seen({test::plate_at(size, place), behind}, 0.8, 0.004);
   scan.viewpoint = {};
   scan.normals_oriented = false;
   const ScanEvidence seen(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
   const model::PreparedModel brick = test::prepared(simulate::box(size));
-  const auto share_at = [&](const Eigen::Vector3d& place) {
-    const Pose model_from_scan(Eigen::Translation3d(-place));
+  const auto share_at = [&](const Eigen::Vector3d& claimed) {
+    const Pose model_from_scan(Eigen::Translation3d(-claimed));
     return share_seen_from_behind(model_from_scan, scan.cloud.positions, brick, seen, {1.0, 2.5 * scan.spacing_mm});
   };
-  EXPECT_LT(share_at(where), 0.01);
-  // Of the front, 100 <= x <= 200, the wall hides what its shadow leaves: that begins behind the far edge of the side.
-  const double shadow_begins = 100.0 * 995.0 / 530.0;
-  EXPECT_NEAR(share_at(where - Eigen::Vector3d(0, 0, 60)), (shadow_begins - 100.0) / 100.0, 0.03);
+  return {share_at(place), share_at(place - Eigen::Vector3d(0, 0, size.z()))};
+}
+
+TEST(ShareSeenFromBehind, TellsTheFrontOfAFaceByWhatStandsBehindIt) {
+  const TriangleMesh panel = test::plate_at({300, 200, 10}, {600, 0, 1000});
+  const auto [right, from_behind] = seen_from_behind_at({200, 200, 60}, {600, 0, 850}, panel);
+  EXPECT_LT(right, 0.01);
+  // Of the front, 500 <= x <= 700, the panel hides what its shadow leaves: that begins behind the far edge of the side.
+  // To parallel rays, that is; to a sensor close behind the panel, which falls between its points, less, but the panel
+  // never loses its say.
+  const double shadow_begins = 500.0 * 995.0 / 880.0;
+  const double of_parallel_rays = (shadow_begins - 500.0) / 200.0;
+  EXPECT_LT(from_behind, of_parallel_rays + 0.03);
+  EXPECT_GT(from_behind, 0.3 * of_parallel_rays);
+}
+
+TEST(ShareSeenFromBehind, IsNoneIfTheSensorMayHaveStoodBeforeWhatIsBehind) {
+  const auto [right, from_behind] = seen_from_behind_at({100, 100, 60}, {150, 0, 500}, wall());  // 3.4 diameters away
+  EXPECT_LT(right, 0.01);
+  EXPECT_EQ(from_behind, 0.0);
 }
 
 TEST(NormalAgreement, IsFullAtTheTruePoseAndNoneWhenFlipped) {

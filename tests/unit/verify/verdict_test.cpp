@@ -108,6 +108,16 @@ TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
+TEST(Verdict, AsksForMoreProofWhereNoRayCanRefuteThePose) {
+  Candidate candidate = flawless();
+  candidate.score = 0.9, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.53
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.without_rays = true;  // 0.34 + 0.26 = 0.6
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  candidate.residual_ratio = 0.1;  // proves 0.67
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
 TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
   Candidate candidate = flawless();
   candidate.score = 0.75, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.39
