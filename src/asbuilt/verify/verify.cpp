@@ -210,22 +210,32 @@ class Verification {
   void register_densely(Candidate& candidate) const {
     make_canonical(candidate);
     constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
+    constexpr int kFewIterations = 30, kManyIterations = 300;
     const std::vector<Eigen::Vector3f> around =
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
-    for (const double scale : {1.5 * final_distance_, final_distance_}) {
-      const LmIcpResult result =
-          lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 30, only_facing()});
+    bool has_converged = false;
+    const auto register_at = [&](double scale_mm, int most_iterations) {
+      const LmIcpResult result = lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint,
+                                        {scale_mm, most_iterations, only_facing()});
       candidate.model_from_scan = result.model_from_scan;
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
-    }
+      has_converged = result.iterations < most_iterations;
+    };
+    register_at(1.5 * final_distance_, kFewIterations);
+    register_at(final_distance_, kFewIterations);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
     const auto judged_densely = [&] {
       return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     };
     PoseEvidence evidence = judged_densely();
+    const bool is_plausible = candidate.score >= kPlausible * options_.acceptance_score;
+    if (is_plausible && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
+      register_at(final_distance_, kManyIterations);
+      evidence = judged_densely();
+    }
     const bool is_loose = candidate.weakest_direction < options_.min_weakest_direction;
-    if (!options_.paper_mode && is_loose && candidate.score >= kPlausible * options_.acceptance_score) {
+    if (!options_.paper_mode && is_loose && is_plausible) {
       const Pose settled = settled_between_edges(candidate.model_from_scan, evidence, model_,
                                                  options_.min_weakest_direction, evidence_, options);
       if (settled.matrix() != candidate.model_from_scan.matrix()) {
