@@ -8,10 +8,12 @@
 
 namespace asbuilt {
 
-/// An indexed triangle mesh in millimetres. Invariant: every index is in [0, vertices.size()).
+/// An indexed triangle mesh in millimetres. Invariants: every index is in [0, vertices.size()); `cad_faces` is empty or as
+/// long as `triangles`.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Eigen::Vector3i> triangles;
+  std::vector<int> cad_faces = {};  ///< the CAD face that each triangle is a piece of; empty for mere meshes
 
   [[nodiscard]] bool empty() const { return triangles.empty(); }
 };

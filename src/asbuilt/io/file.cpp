@@ -3,14 +3,17 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <new>
 #include <system_error>
+#include <utility>
 
 namespace asbuilt::io {
 namespace {
@@ -114,6 +117,42 @@ Result<std::string> read_file(const fs::path& path) {
   } catch (const std::bad_alloc&) {
     return unreadable(fmt::format("{} bytes do not fit into memory", status.st_size));
   }
+}
+
+Result<FileContent> FileContent::open(const fs::path& path) {
+  constexpr std::uintmax_t kSmallestMapped = 64u << 20;
+  FileContent content;
+  std::error_code ignored;
+  const bool is_large = fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) >= kSmallestMapped;
+  const Descriptor descriptor(is_large ? ::open(path.c_str(), O_RDONLY | O_CLOEXEC) : -1);
+  struct stat status {};
+  if (descriptor.open() && ::fstat(descriptor.get(), &status) == 0 && status.st_size > 0) {
+    const auto size = static_cast<std::size_t>(status.st_size);
+    void* const map = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor.get(), 0);
+    if (map != MAP_FAILED) {
+      ::madvise(map, size, MADV_SEQUENTIAL);
+      content.map_ = map;
+      content.size_ = size;
+      return content;
+    }
+  }
+  ASBUILT_TRY(copy, read_file(path));  // also says what is wrong with a file that cannot be opened
+  content.copy_ = std::move(copy);
+  return content;
+}
+
+FileContent::FileContent(FileContent&& other) noexcept
+    : copy_(std::move(other.copy_)), map_(std::exchange(other.map_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+
+FileContent& FileContent::operator=(FileContent&& other) noexcept {
+  std::swap(copy_, other.copy_);
+  std::swap(map_, other.map_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+FileContent::~FileContent() {
+  if (map_ != nullptr) ::munmap(map_, size_);
 }
 
 Result<void> write_file(const fs::path& path, std::string_view content) {

@@ -9,13 +9,16 @@
 #include <optional>
 
 #include "asbuilt/io/lines.h"
+#include "asbuilt/io/readers.h"
 #include "asbuilt/io/scalar_load.h"
 
 namespace asbuilt::io {
 namespace {
 
 constexpr std::string_view kSupported =
-    "expected a scan (.ply, .pcd, .xyz, .asc, .pts, .txt, .csv) or a mesh (.ply, .stl, .obj, .off)";
+    "expected a scan (.ply, .pcd, .e57, .ptx, .las, .xyz, .asc, .pts, .txt, .csv, .png) or a model (.step, .iges, "
+    ".brep, "
+    ".stl, .ply, .obj, .off)";
 
 struct Unsupported {
   std::string_view mark;  ///< how such a file begins, or its extension
@@ -26,28 +29,16 @@ struct Unsupported {
 constexpr std::string_view kMeshWayOut = "export it as STL, OBJ or PLY", kScanWayOut = "export it as PLY or PCD";
 
 constexpr std::array kUnsupportedContent{
-    Unsupported{"ISO-10303-21", "a STEP file", kMeshWayOut},
-    Unsupported{"ASTM-E57", "an E57 file", kScanWayOut},
-    Unsupported{"LASF", "a LAS or LAZ file", kScanWayOut},
     Unsupported{"glTF", "a binary glTF file", kMeshWayOut},
     Unsupported{"#VRML", "a VRML file", kMeshWayOut},
-    Unsupported{"DBRep_DrawableShape", "an OpenCASCADE BREP file", kMeshWayOut},
-    Unsupported{"CASCADE Topology", "an OpenCASCADE BREP file", kMeshWayOut},
     Unsupported{"# vtk DataFile", "a VTK file", "export it as PLY"},
     Unsupported{"PK\x03\x04", "a ZIP archive (or a 3MF file)", "unpack it, or export it as STL, OBJ or PLY"},
-    Unsupported{"\x1f\x8b", "a gzip archive", "unpack it first"},
-    Unsupported{"\x89PNG", "a PNG image", "scans are point clouds, not depth images"},
     Unsupported{"\xd0\xcf\x11\xe0", "a CAD or office file of a closed kind", kMeshWayOut},
     Unsupported{"%PDF", "a PDF document", kMeshWayOut},
     Unsupported{"<?xml", "an XML file", "export the mesh as STL, OBJ or PLY"},
 };
 
 constexpr std::array kUnsupportedExtensions{
-    Unsupported{".step", "a STEP file", kMeshWayOut},
-    Unsupported{".stp", "a STEP file", kMeshWayOut},
-    Unsupported{".iges", "an IGES file", kMeshWayOut},
-    Unsupported{".igs", "an IGES file", kMeshWayOut},
-    Unsupported{".brep", "an OpenCASCADE BREP file", kMeshWayOut},
     Unsupported{".3mf", "a 3MF file", kMeshWayOut},
     Unsupported{".gltf", "a glTF file", kMeshWayOut},
     Unsupported{".dae", "a COLLADA file", kMeshWayOut},
@@ -57,10 +48,6 @@ constexpr std::array kUnsupportedExtensions{
     Unsupported{".ipt", "an Inventor part", kMeshWayOut},
     Unsupported{".catpart", "a CATIA part", kMeshWayOut},
     Unsupported{".prt", "a CAD part of a closed kind", kMeshWayOut},
-    Unsupported{".e57", "an E57 file", kScanWayOut},
-    Unsupported{".las", "a LAS file", kScanWayOut},
-    Unsupported{".laz", "a LAZ file", kScanWayOut},
-    Unsupported{".ptx", "a PTX file", kScanWayOut},
     Unsupported{".ptg", "a PTG file", kScanWayOut},
     Unsupported{".fls", "a FARO scan", kScanWayOut},
     Unsupported{".zfs", "a Zoller+Froehlich scan", kScanWayOut},
@@ -72,7 +59,7 @@ constexpr std::array kUnsupportedExtensions{
 };
 
 tl::unexpected<Error> refuse(const Input& input, const Unsupported& kind) {
-  return input.error(fmt::format("is {}, which is not supported yet, {}", kind.named, kind.way_out));
+  return input.error(fmt::format("is {}, which is not read, {}", kind.named, kind.way_out));
 }
 
 bool is_binary_stl_by_size(std::string_view content) {
@@ -108,6 +95,9 @@ bool is_iges(std::string_view content) {
 }
 
 std::optional<FileKind> kind_from_content(std::string_view content) {
+  if (content.starts_with("ASTM-E57")) return FileKind::e57;
+  if (content.starts_with("LASF")) return FileKind::las;
+  if (content.starts_with("\x89PNG")) return FileKind::depth_png;
   if (content.starts_with("ply\n") || content.starts_with("ply\r\n")) return FileKind::ply;
   if (is_binary_stl_by_size(content) || is_ascii_stl(content)) return FileKind::stl;
   const std::string_view text = without_leading_blanks(content);
@@ -118,21 +108,39 @@ std::optional<FileKind> kind_from_content(std::string_view content) {
     }
   }
   if (is_pcd(content)) return FileKind::pcd;
+  if (text.starts_with("ISO-10303-21")) return FileKind::step;
+  if (text.starts_with("DBRep_DrawableShape") || text.starts_with("CASCADE Topology")) return FileKind::brep;
+  if (is_iges(content)) return FileKind::iges;
+  if (is_ptx(content)) return FileKind::ptx;
   return std::nullopt;
 }
 
-std::optional<FileKind> kind_from_extension(const std::string& extension) {
+}  // namespace
+
+std::string_view name_of(FileKind kind) {
+  constexpr std::string_view kNames[] = {"ply", "pcd", "stl",       "off",  "obj",  "text", "e57",
+                                         "ptx", "las", "png depth", "step", "iges", "brep"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::optional<FileKind> kind_from_extension(std::string_view extension) {
   if (extension == ".ply") return FileKind::ply;
   if (extension == ".pcd") return FileKind::pcd;
   if (extension == ".stl" || extension == ".stla" || extension == ".stlb") return FileKind::stl;
   if (extension == ".off" || extension == ".coff" || extension == ".noff") return FileKind::off;
   if (extension == ".obj") return FileKind::obj;
+  if (extension == ".ptx") return FileKind::ptx;
+  if (extension == ".e57") return FileKind::e57;
+  if (extension == ".las" || extension == ".laz") return FileKind::las;
+  if (extension == ".step" || extension == ".stp" || extension == ".p21") return FileKind::step;
+  if (extension == ".iges" || extension == ".igs") return FileKind::iges;
+  if (extension == ".brep" || extension == ".brp") return FileKind::brep;
   constexpr std::array<std::string_view, 8> kText{".xyz", ".asc", ".pts", ".txt", ".csv", ".xyzn", ".xyzrgb", ".ascii"};
   if (std::ranges::find(kText, extension) != kText.end()) return FileKind::text;
   return std::nullopt;
 }
 
-}  // namespace
+bool is_cad(FileKind kind) { return kind == FileKind::step || kind == FileKind::iges || kind == FileKind::brep; }
 
 bool is_ascii_stl(std::string_view content) {
   if (is_binary_stl_by_size(content)) return false;
@@ -148,8 +156,6 @@ Result<FileKind> kind_of(const std::filesystem::path& path, const Input& input) 
   for (const Unsupported& kind : kUnsupportedContent) {
     if (input.content.starts_with(kind.mark)) return refuse(input, kind);
   }
-  if (is_iges(input.content))
-    return input.error(fmt::format("is an IGES file, which is not supported yet, {}", kMeshWayOut));
   const std::string extension = lower_case(path.extension().string());
   if (const auto kind = kind_from_extension(extension)) return *kind;
   const auto known = std::ranges::find(kUnsupportedExtensions, extension, &Unsupported::mark);

@@ -137,6 +137,8 @@ class HeaderReader {
       return error(fmt::format("POINTS is {}, but WIDTH x HEIGHT is {} x {}", points_.value_or(0), *width_, *height_));
     }
     header_.points = points_.value_or(static_cast<std::uint64_t>(grid));
+    header_.width = width_.value_or(0);
+    header_.height = height_.value_or(0);
     return {};
   }
 

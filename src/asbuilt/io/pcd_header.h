@@ -27,6 +27,7 @@ struct PcdField {
 struct PcdHeader {
   std::vector<PcdField> fields;
   std::uint64_t points = 0;
+  std::uint64_t width = 0, height = 0;                   ///< a height above 1 makes a grid; 0: not declared
   std::size_t point_size = 0;                            ///< bytes a point
   std::size_t point_values = 0;                          ///< values a point
   std::array<double, 7> viewpoint{0, 0, 0, 1, 0, 0, 0};  ///< tx ty tz qw qx qy qz

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -169,6 +171,25 @@ std::function<Eigen::Vector3d(std::size_t)> vectors_of(const PcdHeader& header, 
   return [columns](std::size_t i) { return Eigen::Vector3d(columns[0][i], columns[1][i], columns[2][i]); };
 }
 
+/// PCL packs a colour into the bits of one number, 0x00RRGGBB, which the file may call a float.
+std::function<Rgb(std::size_t)> colours_of(const PcdHeader& header, const Body& body) {
+  auto field = header.find("rgb");
+  if (!field) field = header.find("rgba");
+  if (!field || header.fields[*field].size != 4) return {};
+  const bool is_real = header.fields[*field].type == 'F';
+  return [column = body.columns[*field], is_real](std::size_t i) {
+    const double value = column[i];
+    std::uint32_t bits = 0;
+    if (is_real) {
+      bits = std::bit_cast<std::uint32_t>(static_cast<float>(value));
+    } else if (value >= 0.0 && value <= 4294967295.0) {
+      bits = static_cast<std::uint32_t>(value);
+    }
+    return Rgb{static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
+               static_cast<std::uint8_t>(bits)};
+  };
+}
+
 /// The sensor's place, unless the header has the default pose, which most writers put there without knowing better.
 std::optional<Eigen::Vector3d> viewpoint_of(const PcdHeader& header) {
   if (header.viewpoint == std::array<double, 7>{0, 0, 0, 1, 0, 0, 0}) return std::nullopt;
@@ -177,7 +198,8 @@ std::optional<Eigen::Vector3d> viewpoint_of(const PcdHeader& header) {
 
 }  // namespace
 
-Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, const Input& input, Unit unit) {
+Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, const Input& input,
+                                            const ReadOptions& options) {
   ASBUILT_TRY(header, read_pcd_header(input));
   for (const std::string_view name : {"x", "y", "z"}) {
     if (!header.find(name)) return input.error(fmt::format("the PCD header declares no field {}", name));
@@ -185,14 +207,21 @@ Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, c
   if (header.points == 0) return input.error("the PCD header declares 0 points");
   ASBUILT_TRY(body, read_body(input, header));
 
-  RawPoints points{static_cast<std::size_t>(header.points), vectors_of(header, body, {"x", "y", "z"}), {}};
+  RawPoints points;
+  points.count = static_cast<std::size_t>(header.points);
+  points.position = vectors_of(header, body, {"x", "y", "z"});
   points.normal = vectors_of(header, body, {"normal_x", "normal_y", "normal_z"});
   if (!points.normal) points.normal = vectors_of(header, body, {"nx", "ny", "nz"});
-  ScanFile scan = assemble_scan(path, fmt::format("pcd {}", name_of(header.encoding)), points, unit);
+  points.colour = colours_of(header, body);
+  if (const auto field = header.find("intensity")) {
+    points.intensity = [column = body.columns[*field]](std::size_t i) { return column[i]; };
+  }
+  ScanFile scan = assemble_scan(path, fmt::format("pcd {}", name_of(header.encoding)), points, options.unit);
+  if (header.height > 1) scan.grid = ScanGrid{header.height, header.width};
   std::ranges::move(body.notes, std::back_inserter(scan.notes));
   if (const auto viewpoint = viewpoint_of(header)) {
     if (viewpoint->allFinite())
-      scan.viewpoint_mm = *viewpoint * millimetres_per(unit);
+      scan.viewpoint_mm = *viewpoint * millimetres_per(options.unit);
     else
       scan.notes.emplace_back("The VIEWPOINT of the header is not finite and was ignored.");
   }

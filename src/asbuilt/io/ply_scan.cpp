@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
 #include <string_view>
 
 #include "asbuilt/io/ply_body.h"
@@ -35,6 +38,26 @@ auto row_of(const Columns& columns) {
   return [columns](std::size_t row) { return Eigen::Vector3d(columns[0][row], columns[1][row], columns[2][row]); };
 }
 
+/// Colours as bytes; reals are shares of 1, as some writers have them, and 16 bits are cut to 8.
+std::function<Rgb(std::size_t)> colours_in(const PlyElement& element, const PlyTable& table) {
+  auto columns = columns_named(element, table, {"red", "green", "blue"});
+  std::string_view first = "red";
+  if (!columns)
+    columns = columns_named(element, table, {"diffuse_red", "diffuse_green", "diffuse_blue"}), first = "diffuse_red";
+  if (!columns) return {};
+  const PlyType type = element.properties[*element.find(first)].type;
+  const bool is_share = type == PlyType::float32 || type == PlyType::float64;
+  const double factor = is_share ? 255.0 : type == PlyType::uint16 ? 1.0 / 257.0 : 1.0;
+  return [columns = *columns, factor](std::size_t row) {
+    Rgb rgb;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double value = std::round(columns[c][row] * factor);
+      rgb[c] = static_cast<std::uint8_t>(std::isfinite(value) ? std::clamp(value, 0.0, 255.0) : 0.0);
+    }
+    return rgb;
+  };
+}
+
 /// A sentence when what follows the vertices is damaged: a scan does not need it, but its reader should know.
 std::vector<std::string> notes_on_the_rest(PlyBody& body, const PlyHeader& header, std::size_t next_element) {
   for (std::size_t e = next_element; e < header.elements.size(); ++e) {
@@ -54,7 +77,8 @@ std::vector<std::string> notes_on_the_rest(PlyBody& body, const PlyHeader& heade
 
 }  // namespace
 
-Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, const Input& input, Unit unit) {
+Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, const Input& input,
+                                            const ReadOptions& options) {
   ASBUILT_TRY(header, read_ply_header(input));
   const auto vertex = header.find_element("vertex");
   if (!vertex) return input.error("the PLY header declares no element 'vertex'");
@@ -67,9 +91,17 @@ Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, c
   const auto positions = columns_named(element, table, {"x", "y", "z"});
   if (!positions) return input.error("the vertices have no properties x, y and z");
 
-  RawPoints points{table.rows, row_of(*positions), {}};
+  RawPoints points;
+  points.count = table.rows;
+  points.position = row_of(*positions);
   if (const auto normals = normal_columns(element, table)) points.normal = row_of(*normals);
-  ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, unit);
+  points.colour = colours_in(element, table);
+  for (const std::string_view name : {"intensity", "scalar_intensity", "scalar_Intensity"}) {
+    const auto index = element.find(name);
+    if (!index || element.properties[*index].is_list()) continue;
+    points.intensity = [column = table.columns[*index]](std::size_t row) { return column[row]; };
+  }
+  ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, options.unit);
   std::ranges::move(notes_on_the_rest(body, header, *vertex + 1), std::back_inserter(scan.notes));
   return std::vector<ScanFile>{std::move(scan)};
 }

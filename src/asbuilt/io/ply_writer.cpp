@@ -81,14 +81,16 @@ Result<void> write_ply(const std::filesystem::path& path, std::span<const PlyCol
 }
 
 Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  constexpr std::size_t kVertexBytes = 3 * sizeof(double), kFaceBytes = 1 + 3 * sizeof(std::int32_t);
+  const bool has_faces = !mesh.cad_faces.empty();
+  constexpr std::size_t kVertexBytes = 3 * sizeof(double), kCornerBytes = sizeof(std::int32_t);
+  const std::size_t face_bytes = 1 + (has_faces ? 4 : 3) * kCornerBytes;
   std::string content = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
       "z\n"
-      "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-      mesh.vertices.size(), mesh.triangles.size());
+      "element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
+      mesh.vertices.size(), mesh.triangles.size(), has_faces ? "property int cad_face\n" : "");
   std::size_t target = content.size();
-  content.resize(target + mesh.vertices.size() * kVertexBytes + mesh.triangles.size() * kFaceBytes);
+  content.resize(target + mesh.vertices.size() * kVertexBytes + mesh.triangles.size() * face_bytes);
   const auto put = [&](auto value) {
     store_little_endian(value, content.data() + target);
     target += sizeof(value);
@@ -96,9 +98,10 @@ Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMes
   for (const Eigen::Vector3d& vertex : mesh.vertices) {
     for (int axis = 0; axis < 3; ++axis) put(vertex[axis]);
   }
-  for (const Eigen::Vector3i& triangle : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     put(std::uint8_t{3});
-    for (int corner = 0; corner < 3; ++corner) put(std::int32_t{triangle[corner]});
+    for (int corner = 0; corner < 3; ++corner) put(std::int32_t{mesh.triangles[i][corner]});
+    if (has_faces) put(std::int32_t{mesh.cad_faces[i]});
   }
   return write_file(path, content);
 }

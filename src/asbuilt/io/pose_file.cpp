@@ -103,6 +103,18 @@ Result<std::vector<NamedPose>> poses_from(const Input& input, Unit unit) {
   return is_json ? read_json(input, unit) : read_csv(input, unit);
 }
 
+Result<void> write_poses_csv(const std::filesystem::path& path, std::span<const NamedPose> poses) {
+  std::string text = "name";
+  for (int row = 1; row <= 4; ++row) {
+    for (int column = 1; column <= 4; ++column) text += fmt::format(",a{}{}", row, column);
+  }
+  for (const NamedPose& pose : poses) {
+    text += '\n' + pose.scan;
+    for (int i = 0; i < 16; ++i) text += fmt::format(",{}", pose.model_from_scan.matrix()(i / 4, i % 4));
+  }
+  return write_file(path, text + '\n');
+}
+
 Result<std::vector<NamedPose>> read_poses(const std::filesystem::path& path, Unit unit) {
   ASBUILT_TRY(content, read_file(path));
   return poses_from({path.string(), content}, unit);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,5 +23,9 @@ struct NamedPose {
 /// the translations. Errors: unreadable_input naming line or entry, also for a matrix that is not a rigid motion and
 /// for a scan that is named twice.
 [[nodiscard]] Result<std::vector<NamedPose>> read_poses(const std::filesystem::path& path, Unit unit);
+
+/// Writes what read_poses reads: a header line, then name,a11,...,a44 in mm. Numbers come back exactly as they were.
+/// Errors: unwritable_output.
+[[nodiscard]] Result<void> write_poses_csv(const std::filesystem::path& path, std::span<const NamedPose> poses);
 
 }  // namespace asbuilt::io

@@ -7,6 +7,7 @@
 #include "asbuilt/core/result.h"
 #include "asbuilt/core/triangle_mesh.h"
 #include "asbuilt/io/input.h"
+#include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/pose_file.h"
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/io/unit.h"
@@ -14,20 +15,22 @@
 
 namespace asbuilt::io {
 
-/// read_scans and read_mesh once the file is in memory: they find out its kind and call one of the readers below.
+/// read_scans and read_model once the file is in memory: they find out its kind and call one of the readers below.
 [[nodiscard]] Result<std::vector<ScanFile>> scans_from(const std::filesystem::path& path, const Input& input,
-                                                       Unit unit);
+                                                       const ReadOptions& options);
+[[nodiscard]] Result<ModelFile> model_from(const std::filesystem::path& path, const Input& input,
+                                           const ModelReadOptions& options);
 [[nodiscard]] Result<TriangleMesh> mesh_from(const std::filesystem::path& path, const Input& input, Unit unit);
 
-// One reader per kind of file. Meshes come in the file's
-// unit and may be empty.
+// One reader per kind of file. Meshes come in the file's unit and may be empty.
 
-[[nodiscard]] Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, const Input& input,
-                                                          Unit unit);
-[[nodiscard]] Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, const Input& input,
-                                                          Unit unit);
-[[nodiscard]] Result<std::vector<ScanFile>> read_text_scan(const std::filesystem::path& path, const Input& input,
-                                                           Unit unit);
+using ScanReaderFunction = Result<std::vector<ScanFile>>(const std::filesystem::path& path, const Input& input,
+                                                         const ReadOptions& options);
+[[nodiscard]] ScanReaderFunction read_ply_scan, read_pcd_scan, read_text_scan, read_e57_scans, read_ptx_scans,
+    read_las_scan, read_depth_scan;
+
+/// Whether a text begins like a PTX file: two counts, then four lines of three numbers and four of four.
+[[nodiscard]] bool is_ptx(std::string_view content);
 
 [[nodiscard]] Result<TriangleMesh> read_ply_mesh(const Input& input);
 [[nodiscard]] Result<TriangleMesh> read_stl_mesh(const Input& input);

@@ -14,12 +14,9 @@ namespace asbuilt::io {
 Eigen::Vector3d precision_offset_mm(const RawPoints& points, double mm_per_unit) {
   constexpr double kLargestKept_mm = 65536.0;
   constexpr double kStep_mm = 1000.0;
-  constexpr std::size_t kProbes = 1001;
   std::vector<double> values[3];
-  // Probes at even distances over the index range: the same for the same file, whatever it holds.
-  for (std::size_t k = 0; k < std::min(kProbes, points.count); ++k) {
-    const std::size_t index = points.count <= kProbes ? k : k * (points.count - 1) / (kProbes - 1);
-    const Eigen::Vector3d position = points.position(index) * mm_per_unit;
+  for (std::size_t k = 0; k < std::min(kOffsetProbes, points.count); ++k) {
+    const Eigen::Vector3d position = points.position(probe_index(k, points.count)) * mm_per_unit;
     if (!position.allFinite() || position.isZero(0.0)) continue;
     for (int axis = 0; axis < 3; ++axis) values[axis].push_back(position[axis]);
   }
@@ -32,38 +29,75 @@ Eigen::Vector3d precision_offset_mm(const RawPoints& points, double mm_per_unit)
   return offset;
 }
 
+MovedPositions::MovedPositions(ScanFile& scan, double mm_per_unit)
+    : scan_(scan), mm_per_unit_(mm_per_unit), moved_(!scan.offset_mm.isZero(0.0)) {}
+
+void MovedPositions::add(const Eigen::Vector3d& position) {
+  if (moved_ && position.isZero(0.0)) {
+    scan_.cloud.positions.push_back(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+    ++no_returns_;
+    return;
+  }
+  scan_.cloud.positions.push_back((position * mm_per_unit_ - scan_.offset_mm).cast<float>());
+}
+
+void MovedPositions::note() {
+  if (moved_) {
+    scan_.notes.push_back(fmt::format("Large coordinates: the offset ({:.0f}, {:.0f}, {:.0f}) mm was taken off.",
+                                      scan_.offset_mm.x(), scan_.offset_mm.y(), scan_.offset_mm.z()));
+  }
+  if (no_returns_ > 0) {
+    scan_.notes.push_back(fmt::format("{} points at exactly (0, 0, 0) were taken for missing returns.", no_returns_));
+  }
+}
+
 ScanFile assemble_scan(const std::filesystem::path& path, std::string format, const RawPoints& points, Unit unit) {
   ScanFile scan;
   scan.path = path;
   scan.name = path.stem().string();
   scan.format = std::move(format);
+  scan.unit = unit == Unit::stated ? Unit::millimetre : unit;
   const double mm_per_unit = millimetres_per(unit);
   scan.offset_mm = precision_offset_mm(points, mm_per_unit);
-  const bool moved = !scan.offset_mm.isZero(0.0);
-
-  std::size_t no_returns = 0;
+  MovedPositions positions(scan, mm_per_unit);
   scan.cloud.positions.reserve(points.count);
-  for (std::size_t i = 0; i < points.count; ++i) {
-    const Eigen::Vector3d position = points.position(i);
-    if (moved && position.isZero(0.0)) {
-      scan.cloud.positions.push_back(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
-      ++no_returns;
-      continue;
-    }
-    scan.cloud.positions.push_back((position * mm_per_unit - scan.offset_mm).cast<float>());
-  }
+  for (std::size_t i = 0; i < points.count; ++i) positions.add(points.position(i));
+  positions.note();
   if (points.normal) {
     scan.cloud.normals.reserve(points.count);
     for (std::size_t i = 0; i < points.count; ++i) scan.cloud.normals.push_back(points.normal(i).cast<float>());
   }
-  if (moved) {
-    scan.notes.push_back(fmt::format("Large coordinates: the offset ({:.0f}, {:.0f}, {:.0f}) mm was taken off.",
-                                     scan.offset_mm.x(), scan.offset_mm.y(), scan.offset_mm.z()));
+  if (points.colour) {
+    scan.colours.reserve(points.count);
+    for (std::size_t i = 0; i < points.count; ++i) scan.colours.push_back(points.colour(i));
   }
-  if (no_returns > 0) {
-    scan.notes.push_back(fmt::format("{} points at exactly (0, 0, 0) were taken for missing returns.", no_returns));
+  if (points.intensity) {
+    scan.intensities.reserve(points.count);
+    for (std::size_t i = 0; i < points.count; ++i) {
+      scan.intensities.push_back(static_cast<float>(points.intensity(i)));
+    }
   }
   return scan;
+}
+
+Result<std::vector<ScanFile>> readable_of(const std::filesystem::path& path, std::vector<Result<ScanFile>> scans) {
+  std::vector<ScanFile> readable;
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    if (!scans[i]) {
+      notes.push_back(
+          fmt::format("Another scan of this file cannot be read and was left out: {}.", scans[i].error().message));
+      continue;
+    }
+    ScanFile& scan = readable.emplace_back(std::move(*scans[i]));
+    scan.path = path;
+    scan.name = path.stem().string();
+    if (scans.size() > 1) scan.name += fmt::format("_{:02}", i);
+    scan.index_in_file = static_cast<int>(readable.size()) - 1;
+  }
+  if (readable.empty()) return tl::unexpected(scans.front().error());
+  readable.back().notes.insert(readable.back().notes.end(), notes.begin(), notes.end());
+  return readable;
 }
 
 }  // namespace asbuilt::io

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/io/scan_file.h"
 
+#include <fmt/format.h>
+
 #include <new>
 
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/file_kind.h"
+#include "asbuilt/io/gzip.h"
 #include "asbuilt/io/readers.h"
 #include "asbuilt/io/scan_assembly.h"
 
@@ -16,7 +19,9 @@ Result<std::vector<ScanFile>> scan_from_mesh(const std::filesystem::path& path, 
                                              const Result<TriangleMesh>& read, Unit unit) {
   if (!read) return tl::unexpected(read.error());
   if (read->vertices.empty()) return input.error("the file holds no points");
-  const RawPoints points{read->vertices.size(), [&](std::size_t i) { return read->vertices[i]; }, {}};
+  RawPoints points;
+  points.count = read->vertices.size();
+  points.position = [&](std::size_t i) { return read->vertices[i]; };
   ScanFile scan = assemble_scan(path, std::move(format), points, unit);
   scan.notes.emplace_back("The file is a mesh: its vertices were taken as points.");
   const bool is_text = scan.format != "stl binary";
@@ -27,39 +32,63 @@ Result<std::vector<ScanFile>> scan_from_mesh(const std::filesystem::path& path, 
 }
 
 Result<std::vector<ScanFile>> read_kind(FileKind kind, const std::filesystem::path& path, const Input& input,
-                                        Unit unit) {
+                                        const ReadOptions& options) {
   switch (kind) {
     case FileKind::ply:
-      return read_ply_scan(path, input, unit);
+      return read_ply_scan(path, input, options);
     case FileKind::pcd:
-      return read_pcd_scan(path, input, unit);
+      return read_pcd_scan(path, input, options);
     case FileKind::text:
-      return read_text_scan(path, input, unit);
+      return read_text_scan(path, input, options);
+    case FileKind::e57:
+      return read_e57_scans(path, input, options);
+    case FileKind::ptx:
+      return read_ptx_scans(path, input, options);
+    case FileKind::las:
+      return read_las_scan(path, input, options);
+    case FileKind::depth_png:
+      return read_depth_scan(path, input, options);
     case FileKind::stl:
       return scan_from_mesh(path, is_ascii_stl(input.content) ? "stl ascii" : "stl binary", input, read_stl_mesh(input),
-                            unit);
+                            options.unit);
     case FileKind::off:
-      return scan_from_mesh(path, "off", input, read_off_mesh(input), unit);
+      return scan_from_mesh(path, "off", input, read_off_mesh(input), options.unit);
     case FileKind::obj:
-      return scan_from_mesh(path, "obj", input, read_obj_mesh(input), unit);
+      return scan_from_mesh(path, "obj", input, read_obj_mesh(input), options.unit);
+    case FileKind::step:
+    case FileKind::iges:
+    case FileKind::brep:
+      return input.error(fmt::format("is a CAD file ({}), expected a scan; the model stands first on the command line",
+                                     name_of(kind)));
   }
   throw std::logic_error("asbuilt: expected a kind of file");
 }
 
 }  // namespace
 
-Result<std::vector<ScanFile>> scans_from(const std::filesystem::path& path, const Input& input, Unit unit) {
+Result<std::vector<ScanFile>> scans_from(const std::filesystem::path& path, const Input& input,
+                                         const ReadOptions& options) {
   try {
     ASBUILT_TRY(kind, kind_of(path, input));
-    return read_kind(kind, path, input, unit);
+    return read_kind(kind, path, input, options);
   } catch (const std::bad_alloc&) {
     return input.error("the scan does not fit into memory");
   }
 }
 
-Result<std::vector<ScanFile>> read_scans(const std::filesystem::path& path, Unit unit) {
-  ASBUILT_TRY(content, read_file(path));
-  return scans_from(path, {path.string(), content}, unit);
+Result<std::vector<ScanFile>> scans_in(const std::filesystem::path& path, std::string_view content,
+                                       const ReadOptions& options) {
+  const Input input{path.string(), content};
+  if (!is_gzip(content)) return scans_from(path, input, options);
+  ASBUILT_TRY(unpacked, gunzip(input));
+  ASBUILT_TRY(scans, scans_from(name_without_gz(path), {path.string(), unpacked}, options));
+  for (ScanFile& scan : scans) scan.path = path;
+  return std::move(scans);
+}
+
+Result<std::vector<ScanFile>> read_scans(const std::filesystem::path& path, const ReadOptions& options) {
+  ASBUILT_TRY(content, FileContent::open(path));
+  return scans_in(path, content.view(), options);
 }
 
 }  // namespace asbuilt::io

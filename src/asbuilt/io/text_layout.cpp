@@ -129,18 +129,49 @@ std::string_view name_of(Separator separator) {
   throw std::logic_error("asbuilt: expected a separator");
 }
 
+/// Whether three neighbouring columns look like colours: whole numbers from 0 to 255, and not always the same.
+bool looks_like_colours(const std::vector<std::vector<double>>& rows, std::size_t column) {
+  bool varies = false;
+  for (const std::vector<double>& row : rows) {
+    for (std::size_t i = column; i < column + 3; ++i) {
+      if (!(row[i] >= 0.0 && row[i] <= 255.0 && std::floor(row[i]) == row[i])) return false;
+      varies = varies || row[i] != rows.front()[i];
+    }
+  }
+  return varies;
+}
+
+/// "1 to 3 were taken for x, y, z, 5 to 7 for the colour, the rest not used".
+std::string description(const TextLayout& layout) {
+  const auto range = [](const std::array<std::size_t, 3>& columns) {
+    const bool in_a_row = columns[1] == columns[0] + 1 && columns[2] == columns[0] + 2;
+    return in_a_row ? fmt::format("{} to {}", columns[0] + 1, columns[2] + 1)
+                    : fmt::format("{}, {}, {}", columns[0] + 1, columns[1] + 1, columns[2] + 1);
+  };
+  std::string text = fmt::format("columns {} were taken for x, y, z", range(layout.position));
+  std::size_t used = 3;
+  if (layout.normal) text += fmt::format(", columns {} for normals", range(*layout.normal)), used += 3;
+  if (layout.colour) text += fmt::format(", columns {} for the colour", range(*layout.colour)), used += 3;
+  if (layout.intensity) text += fmt::format(", column {} for the intensity", *layout.intensity + 1), used += 1;
+  return text + (used < layout.columns ? ", the rest not used" : ", nothing else");
+}
+
 void take_columns_by_place(Head& head, TextLayout& layout) {
   std::erase_if(head.rows, [&](const std::vector<double>& row) { return row.size() != layout.columns; });
-  std::string_view rest = "nothing else";
   for (std::size_t c = 3; c + 3 <= layout.columns && !layout.normal; ++c) {
     if (looks_like_normals(head.rows, c)) layout.normal = {c, c + 1, c + 2};
   }
-  if (layout.columns > 3) rest = "the rest not used";
-  const std::string normals =
-      layout.normal ? fmt::format(", columns {} to {} for normals", (*layout.normal)[0] + 1, (*layout.normal)[2] + 1)
-                    : "";
-  layout.notes.push_back(fmt::format("{} columns parted by {}: columns 1 to 3 were taken for x, y, z{}, {}.",
-                                     layout.columns, name_of(layout.separator), normals, rest));
+  const auto is_free = [&](std::size_t c) {
+    return !layout.normal || c + 2 < (*layout.normal)[0] || c > (*layout.normal)[2];
+  };
+  for (std::size_t c = 3; c + 3 <= layout.columns && !layout.colour; ++c) {
+    if (is_free(c) && looks_like_colours(head.rows, c)) layout.colour = {c, c + 1, c + 2};
+  }
+  // x y z intensity, also before colours: what PTS files have.
+  const bool is_pts = (layout.columns == 4 || (layout.columns == 7 && layout.colour)) && !layout.normal;
+  if (is_pts && (!layout.colour || (*layout.colour)[0] == 4)) layout.intensity = 3;
+  layout.notes.push_back(fmt::format("{} columns parted by {}: {}; --columns says otherwise.", layout.columns,
+                                     name_of(layout.separator), description(layout)));
 }
 
 /// False when the names tell nothing about x, y and z.
@@ -150,10 +181,55 @@ bool take_columns_by_name(const Fields& names, TextLayout& layout) {
   layout.position = *position;
   layout.normal = columns_named(names, {"nx", "ny", "nz"});
   if (!layout.normal) layout.normal = columns_named(names, {"normal_x", "normal_y", "normal_z"});
+  layout.colour = columns_named(names, {"r", "g", "b"});
+  if (!layout.colour) layout.colour = columns_named(names, {"red", "green", "blue"});
+  for (const std::string_view name : {"i", "intensity", "scalar_intensity"}) {
+    const auto found = std::ranges::find(names, name);
+    if (found != names.end()) layout.intensity = static_cast<std::size_t>(found - names.begin());
+  }
   layout.notes.push_back(fmt::format("{} columns parted by {}: x, y, z{} were taken by the names in the header.",
                                      layout.columns, name_of(layout.separator),
                                      layout.normal ? " and the normal" : ""));
   return true;
+}
+
+/// The columns as the user states them.
+Result<void> take_columns_as_stated(const Input& input, std::string_view stated, std::size_t first_line,
+                                    TextLayout& layout) {
+  std::vector<std::string> storage;
+  Fields names = names_in(stated, storage);
+  const auto wrong = [&](std::string_view what) {
+    return fail(
+        ErrorCode::invalid_argument,
+        fmt::format("--columns {}: {}, expected names out of x y z nx ny nz r g b i parted by commas, and - for "
+                    "what is passed over",
+                    in_quotes(stated), what));
+  };
+  for (std::string_view& name : names) {
+    if (name == "red") name = "r";
+    if (name == "green") name = "g";
+    if (name == "blue") name = "b";
+    if (name == "intensity") name = "i";
+    constexpr std::array<std::string_view, 11> kKnown{"x", "y", "z", "nx", "ny", "nz", "r", "g", "b", "i", "-"};
+    if (std::ranges::find(kKnown, name) == kKnown.end()) return wrong(fmt::format("found {}", in_quotes(name)));
+    if (name != "-" && std::ranges::count(names, name) > 1)
+      return wrong(fmt::format("found {} twice", in_quotes(name)));
+  }
+  const auto position = columns_named(names, {"x", "y", "z"});
+  if (!position) return wrong("x, y and z are not all among them");
+  if (names.size() != layout.columns) {
+    return input.error_at_line(first_line,
+                               fmt::format("found {} values, --columns names {}", layout.columns, names.size()));
+  }
+  layout.position = *position;
+  layout.normal = columns_named(names, {"nx", "ny", "nz"});
+  layout.colour = columns_named(names, {"r", "g", "b"});
+  if (const auto found = std::ranges::find(names, std::string_view("i")); found != names.end()) {
+    layout.intensity = static_cast<std::size_t>(found - names.begin());
+  }
+  layout.notes.push_back(fmt::format("{} columns parted by {}, as --columns states: {}.", layout.columns,
+                                     name_of(layout.separator), description(layout)));
+  return {};
 }
 
 }  // namespace
@@ -189,7 +265,7 @@ bool is_comment(std::string_view line) {
 
 std::optional<std::uint64_t> count_line(std::string_view line) { return parse_count(trimmed(line)); }
 
-Result<TextLayout> guess_layout(const Input& input) {
+Result<TextLayout> layout_of(const Input& input, std::string_view stated_columns) {
   TextLayout layout;
   ASBUILT_TRY(head, read_head(input, layout));
   layout.columns = head.rows.front().size();
@@ -197,6 +273,10 @@ Result<TextLayout> guess_layout(const Input& input) {
   if (layout.columns < 3) {
     return input.error_at_line(head.first_line,
                                fmt::format("found {} numbers, expected at least x y z", layout.columns));
+  }
+  if (!stated_columns.empty()) {
+    ASBUILT_CHECK(take_columns_as_stated(input, stated_columns, head.first_line, layout));
+    return layout;
   }
   std::vector<std::string> storage;
   if (take_columns_by_name(names_in(head.names_line, storage), layout)) return layout;

@@ -34,12 +34,16 @@ struct TextLayout {
   std::size_t columns = 0;                           ///< in every line
   std::array<std::size_t, 3> position{0, 1, 2};      ///< columns of x, y, z
   std::optional<std::array<std::size_t, 3>> normal;  ///< columns of nx, ny, nz
-  std::size_t header_line = 0;                       ///< number of the line that names the columns, 0 if there is none
-  std::vector<std::string> notes;                    ///< what was guessed
+  std::optional<std::array<std::size_t, 3>> colour;  ///< columns of red, green, blue, 0 to 255
+  std::optional<std::size_t> intensity;
+  std::size_t header_line = 0;     ///< number of the line that names the columns, 0 if there is none
+  std::vector<std::string> notes;  ///< what was guessed
 };
 
-/// Decides from the head of a file (names of columns, and up to 1000 lines of numbers).
-/// Errors: unreadable_input when no line of at least three numbers is found.
-[[nodiscard]] Result<TextLayout> guess_layout(const Input& input);
+/// Decides from the head of a file (names of columns, and up to 1000 lines of numbers), or takes the columns that the
+/// user states: names x y z nx ny nz r g b i parted by commas, with - for what is to be passed over.
+/// Errors: unreadable_input when no line of at least three numbers is found, or the stated columns do not fit;
+/// invalid_argument when they make no sense.
+[[nodiscard]] Result<TextLayout> layout_of(const Input& input, std::string_view stated_columns);
 
 }  // namespace asbuilt::io

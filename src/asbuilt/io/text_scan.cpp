@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "asbuilt/io/lines.h"
@@ -16,6 +17,8 @@ namespace {
 /// The points of one scan. PTS files may hold several, each headed by its count.
 struct Block {
   std::vector<Eigen::Vector3d> positions, normals;
+  std::vector<Rgb> colours;
+  std::vector<float> intensities;
   std::optional<std::uint64_t> declared;
 };
 
@@ -78,11 +81,22 @@ class TextReader {
     }
     block.positions.push_back(vector_of(layout_.position));
     if (layout_.normal) block.normals.push_back(vector_of(*layout_.normal));
+    if (layout_.colour) block.colours.push_back(colour_of(*layout_.colour));
+    if (layout_.intensity) block.intensities.push_back(static_cast<float>(numbers_[*layout_.intensity]));
     return {};
   }
 
   [[nodiscard]] Eigen::Vector3d vector_of(const std::array<std::size_t, 3>& columns) const {
     return {numbers_[columns[0]], numbers_[columns[1]], numbers_[columns[2]]};
+  }
+
+  [[nodiscard]] Rgb colour_of(const std::array<std::size_t, 3>& columns) const {
+    Rgb rgb;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double value = numbers_[columns[c]];
+      rgb[c] = static_cast<std::uint8_t>(std::isfinite(value) ? std::clamp(value, 0.0, 255.0) : 0.0);
+    }
+    return rgb;
   }
 
   const Input& input_;
@@ -100,22 +114,27 @@ std::string format_of(const std::filesystem::path& path) {
 
 }  // namespace
 
-Result<std::vector<ScanFile>> read_text_scan(const std::filesystem::path& path, const Input& input, Unit unit) {
+Result<std::vector<ScanFile>> read_text_scan(const std::filesystem::path& path, const Input& input,
+                                             const ReadOptions& options) {
   if (input.content.starts_with("\xff\xfe") || input.content.starts_with("\xfe\xff")) {
     return input.error("is text in UTF-16, save it as UTF-8 or ASCII");
   }
   Input text = input;
   if (text.content.starts_with("\xef\xbb\xbf")) text.content.remove_prefix(3);  // a byte order mark
-  ASBUILT_TRY(layout, guess_layout(text));
+  ASBUILT_TRY(layout, layout_of(text, options.columns));
   TextReader reader(text, layout);
   ASBUILT_TRY(blocks, reader.read());
   std::erase_if(blocks, [](const Block& block) { return block.positions.empty(); });
 
   std::vector<ScanFile> scans;
   for (const Block& block : blocks) {
-    RawPoints points{block.positions.size(), [&](std::size_t i) { return block.positions[i]; }, {}};
+    RawPoints points;
+    points.count = block.positions.size();
+    points.position = [&](std::size_t i) { return block.positions[i]; };
     if (layout.normal) points.normal = [&](std::size_t i) { return block.normals[i]; };
-    ScanFile scan = assemble_scan(path, format_of(path), points, unit);
+    if (layout.colour) points.colour = [&](std::size_t i) { return block.colours[i]; };
+    if (layout.intensity) points.intensity = [&](std::size_t i) { return static_cast<double>(block.intensities[i]); };
+    ScanFile scan = assemble_scan(path, format_of(path), points, options.unit);
     scan.notes.insert(scan.notes.begin(), layout.notes.begin(), layout.notes.end());
     scan.index_in_file = static_cast<int>(scans.size());
     if (blocks.size() > 1) scan.name += fmt::format("_{:02}", scans.size());

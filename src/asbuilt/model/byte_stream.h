@@ -30,6 +30,10 @@ class ByteWriter {
     put(static_cast<std::uint64_t>(values.size()));
     for (const auto& value : values) bytes_.append(reinterpret_cast<const char*>(value.data()), 3 * sizeof(Scalar));
   }
+  void put(const std::vector<int>& values) {
+    put(static_cast<std::uint64_t>(values.size()));
+    for (const int value : values) put(static_cast<std::int32_t>(value));
+  }
 
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
@@ -65,6 +69,17 @@ class ByteReader {
     for (auto& value : values) {
       std::memcpy(value.data(), bytes, 3 * sizeof(Scalar));
       bytes += 3 * sizeof(Scalar);
+    }
+  }
+  void get(std::vector<int>& values) {
+    std::uint64_t size = 0;
+    get(size);
+    values.clear();
+    const char* bytes = take(size, sizeof(std::int32_t));
+    for (std::uint64_t i = 0; bytes != nullptr && i < size; ++i, bytes += sizeof(std::int32_t)) {
+      std::int32_t value = 0;
+      std::memcpy(&value, bytes, sizeof(value));
+      values.push_back(value);
     }
   }
 

@@ -114,6 +114,7 @@ TriangleMesh subset(const TriangleMesh& mesh, const std::vector<std::uint8_t>& k
       corners[k] = place[vertex];
     }
     result.triangles.push_back(corners);
+    if (!mesh.cad_faces.empty()) result.cad_faces.push_back(mesh.cad_faces[i]);
   }
   return result;
 }
@@ -124,13 +125,14 @@ CleanedMesh cleaned(const TriangleMesh& mesh, double tolerance_mm) {
   for (std::size_t i = 0; i < root.size(); ++i) result.vertices_welded += root[i] != static_cast<int>(i) ? 1 : 0;
 
   TriangleMesh welded{mesh.vertices, {}};
-  for (const Eigen::Vector3i& triangle : mesh.triangles) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const Eigen::Vector3i corners =
-        triangle.unaryExpr([&](int vertex) { return root[static_cast<std::size_t>(vertex)]; });
+        mesh.triangles[i].unaryExpr([&](int vertex) { return root[static_cast<std::size_t>(vertex)]; });
     if (is_degenerate(welded, corners, tolerance_mm)) {
       ++result.degenerate_dropped;
     } else {
       welded.triangles.push_back(corners);
+      if (!mesh.cad_faces.empty()) welded.cad_faces.push_back(mesh.cad_faces[i]);
     }
   }
   result.mesh = subset(welded, first_of_each(welded.triangles));

@@ -23,7 +23,7 @@ constexpr std::string_view kMagic(
     "\x89"
     "ASBUILT-MODEL\r\n",
     16);
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kDigestSize = 64;                                                  // hexadecimal digits
 constexpr std::size_t kHeaderSize = 16 + sizeof(std::uint32_t) + sizeof(std::uint64_t);  // magic, version, body's size
 
@@ -40,6 +40,7 @@ void transfer(PreparedModel& model, const Stream& stream) {
   stream(model.sampling_distance);
   stream(model.skin.vertices);
   stream(model.skin.triangles);
+  stream(model.skin.cad_faces);
   stream(model.samples.positions);
   stream(model.samples.normals);
   stream(model.dense_samples.positions);
@@ -155,7 +156,8 @@ bool is_consistent(const PreparedModel& model) {
   };
   const bool has_size = model.diameter > 0.0 && std::isfinite(model.diameter) && model.sampling_distance > 0.0 &&
                         model.sampling_distance <= model.diameter;
-  return has_size && !model.skin.empty() && all_finite(model.skin.vertices) &&
+  const bool has_faces = model.skin.cad_faces.empty() || model.skin.cad_faces.size() == model.skin.triangles.size();
+  return has_size && has_faces && !model.skin.empty() && all_finite(model.skin.vertices) &&
          std::ranges::all_of(model.skin.triangles, in_range) && is_oriented(model.samples) &&
          is_oriented(model.dense_samples) && is_consistent(model.symmetry);
 }

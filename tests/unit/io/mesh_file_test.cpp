@@ -152,8 +152,8 @@ TEST_F(MeshFile, DamagedObjIsRefused) {
 }
 
 TEST_F(MeshFile, APointCloudIsNoMesh) {
-  EXPECT_THAT(error_of("a.xyz", "1 2 3\n"), HasSubstr("is a point cloud, expected a mesh"));
-  EXPECT_THAT(error_of("a.pcd", "FIELDS x y z\n"), HasSubstr("is a point cloud, expected a mesh"));
+  EXPECT_THAT(error_of("a.xyz", "1 2 3\n"), HasSubstr("is a scan, expected a model"));
+  EXPECT_THAT(error_of("a.pcd", "FIELDS x y z\n"), HasSubstr("is a scan, expected a model"));
 }
 
 TEST_F(MeshFile, AMeshIsWelcomeAsAScan) {

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "asbuilt/io/mesh_file.h"
 #include "unit/io/temporary_folder.h"
 
@@ -26,21 +28,31 @@ std::string error_of(const std::filesystem::path& path) {
 
 TEST(FileKind, KnownButUnsupportedKindsAreRefusedByTheirContentWithAWayOut) {
   const TemporaryFolder folder;
-  EXPECT_THAT(error_of(folder.file("part.stl.txt", "ISO-10303-21;\nHEADER;\n")),
-              AllOf(HasSubstr("is a STEP file, which is not supported yet"), HasSubstr("export it as STL")));
-  EXPECT_THAT(error_of(folder.file("scan.ply", "ASTM-E57\1\0\0\0")),
-              AllOf(HasSubstr("is an E57 file"), HasSubstr("export it as PLY or PCD")));
-  EXPECT_THAT(error_of(folder.file("scan", "LASF")), HasSubstr("is a LAS or LAZ file"));
+  EXPECT_THAT(error_of(folder.file("scan.ply", "%PDF-1.4\n")),
+              AllOf(HasSubstr("is a PDF document, which is not read"), HasSubstr("export it as STL")));
   EXPECT_THAT(error_of(folder.file("part", "PK\x03\x04")), HasSubstr("ZIP archive"));
-  EXPECT_THAT(error_of(folder.file("part", "S" + std::string(71, ' ') + "S      1\n")), HasSubstr("is an IGES file"));
-  EXPECT_THAT(error_of(folder.file("scan.ptx", "1\n1\n0 0 0\n")), HasSubstr("is a PTX file"));
-  EXPECT_THAT(error_of(folder.file("Part.STP", "whatever")), HasSubstr("is a STEP file"));
+  EXPECT_THAT(error_of(folder.file("Part.SLDPRT", "whatever")), HasSubstr("is a SolidWorks part"));
+  EXPECT_THAT(error_of(folder.file("hall.fls", "whatever")), HasSubstr("export it as PLY or PCD"));
+}
+
+TEST(FileKind, ScansAndModelsAreToldApartWhereTheOtherIsWanted) {
+  const TemporaryFolder folder;
+  for (const auto& [name, content] :
+       {std::pair("scan.ply", "ASTM-E57\1"), std::pair("scan", "LASF"), std::pair("scan.ptx", "1\n1\n0 0 0\n")}) {
+    EXPECT_THAT(read_mesh(folder.file(name, content), Unit::stated).error().message,
+                HasSubstr("is a scan, expected a model"));
+  }
+  for (const auto& [name, content] :
+       {std::pair("part.stl.txt", "ISO-10303-21;\nHEADER;\n"), std::pair("Part.STP", "whatever"),
+        std::pair("part", "S                                                                       S      1\n")}) {
+    EXPECT_THAT(read_scans(folder.file(name, content), Unit::stated).error().message, HasSubstr("is a CAD file"));
+  }
 }
 
 TEST(FileKind, UnknownKindsAreRefusedWithTheListOfTheKnown) {
   const TemporaryFolder folder;
   EXPECT_THAT(error_of(folder.file("notes.doc", "hello")),
-              AllOf(HasSubstr("extension '.doc'"), HasSubstr(".ply, .pcd, .xyz"), HasSubstr(".stl, .obj, .off")));
+              AllOf(HasSubstr("extension '.doc'"), HasSubstr(".ply, .pcd, .e57"), HasSubstr(".stl, .ply, .obj, .off")));
   EXPECT_THAT(error_of(folder.file("empty.ply", "")), HasSubstr("empty.ply: the file is empty"));
   EXPECT_THAT(error_of(folder.path()), HasSubstr("is a folder"));
   EXPECT_THAT(error_of(folder.path() / "none.ply"), HasSubstr("none.ply: there is no such file"));

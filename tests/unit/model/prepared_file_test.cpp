@@ -144,9 +144,9 @@ TEST_F(PreparedFile, IsRefusedWhenAnyByteOfItIsDamaged) {
 
 TEST_F(PreparedFile, OfANewerVersionSaysSo) {
   std::string newer = content_;
-  newer[16] = 3;
+  newer[16] = 4;
   const std::string message = message_for(newer);
-  EXPECT_THAT(message, HasSubstr("version 3"));
+  EXPECT_THAT(message, HasSubstr("version 4"));
   EXPECT_THAT(message, HasSubstr("newer"));
 }
 

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace asbuilt::io {
+
+/// CRC-32C (Castagnoli; reflected polynomial 0x82F63B78, start and final value all ones), as E57 pages carry it.
+[[nodiscard]] std::uint32_t crc32c(std::string_view bytes);
+
+}  // namespace asbuilt::io
