@@ -21,7 +21,10 @@ Pose for_local(const Pose& model_from_scan, const Eigen::Vector3d& offset_mm) {
   return model_from_scan * Eigen::Translation3d(offset_mm);
 }
 
-scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::ScanFile& file) {
+/// What the user typed, in the unit of the file, becomes a place in the scan's local coordinates.
+scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::ScanFile& file, const Options& options) {
+  const bool is_point = request.stated.kind == scan::Viewpoint::Kind::point;
+  if (is_point && options.scan_unit == io::Unit::stated) request.stated.value *= io::millimetres_per(file.unit);
   if (request.stated.kind == scan::Viewpoint::Kind::point) request.stated.value -= file.offset_mm;
   // The origin, which `auto` would try, is kilometres away from points that needed an offset.
   if (!file.offset_mm.isZero(0.0) && !file.viewpoint_mm) request.automatic = false;
@@ -29,7 +32,7 @@ scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::S
 }
 
 Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, const Context& context) {
-  const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file);
+  const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file, half.options);
   std::optional<Eigen::Vector3d> file_viewpoint;
   if (file.viewpoint_mm) file_viewpoint = *file.viewpoint_mm - file.offset_mm;
   auto scan = scan::prepare_scan(file.cloud, file_viewpoint, request, half.options.scan, context);
@@ -167,6 +170,13 @@ Result<std::vector<verify::Detection>> placements_in(const scan::Scan& scan,
 
 }  // namespace
 
+Options with_units_read(const ScanHalf& half, const io::ScanFile& file) {
+  Options options = half.options;
+  options.scan_unit = file.unit;
+  if (options.model_unit == io::Unit::stated) options.model_unit = half.model.unit;
+  return options;
+}
+
 Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
                                            const Context& context) {
   JudgedScan judged;
@@ -177,7 +187,7 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
   }
   if (!scan) return tl::unexpected(scan.error());
   describe_scan(judged.record, *scan, file);
-  if (const auto contradiction = size_contradiction(*scan, half.model.prepared, half.options)) {
+  if (const auto contradiction = size_contradiction(*scan, half.model.prepared, with_units_read(half, file))) {
     judged.record.status = io::ScanStatus::rejected;
     judged.record.reason_code = verify::code_of(verify::Reason::scan_too_small);
     judged.record.reason = *contradiction;
@@ -214,7 +224,7 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     entry.record.instances_in_scan = static_cast<int>(placements.size());
     describe_detection(entry.record, detection);
     if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
-    if (!detection.segment.empty()) entry.segment = cut_out(*scan, detection, half.model.prepared);
+    if (!detection.segment.empty()) entry.segment = cut_out(*scan, file, detection, half.model.prepared);
     entries.push_back(std::move(entry));
   }
   return entries;

@@ -33,6 +33,9 @@ struct JudgedScan {
   std::optional<Segment> segment;
 };
 
+/// The options with the units in which model and scan were taken to be, so that a mistaken one can be named.
+[[nodiscard]] Options with_units_read(const ScanHalf& half, const io::ScanFile& file);
+
 /// Prepares a scan, detects the part in it and verifies; poses in the record are for the coordinates of the file. One
 /// entry, or with `Instances::all` one for each placement of the part, best first; where there is none, one that says
 /// why. Errors: those of the stages; nothing is decided then.

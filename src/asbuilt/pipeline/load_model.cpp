@@ -11,13 +11,15 @@ namespace asbuilt::pipeline {
 
 namespace {
 
-Result<model::PreparedModel> prepared_from_mesh(const std::string& path, std::string sha256, const Options& options,
-                                                const Context& context) {
-  ASBUILT_TRY(mesh, io::read_mesh(path, options.model_unit));
-  auto prepared = model::prepare(mesh, options.model, context);
+Result<model::PreparedModel> prepared_from_file(const std::string& path, std::string sha256, const Options& options,
+                                                io::Unit& unit, const Context& context) {
+  ASBUILT_TRY(file, io::read_model(path, model_reading(options)));
+  unit = file.unit;
+  auto prepared = model::prepare(file.mesh, options.model, context);
   if (!prepared && prepared.error().code == ErrorCode::cancelled) return tl::unexpected(prepared.error());
   // A mesh that cannot be a part is no readable input, whatever its syntax.
   if (!prepared) return fail(ErrorCode::unreadable_input, fmt::format("{}: {}", path, prepared.error().message));
+  prepared->report.notes.insert(prepared->report.notes.begin(), file.notes.begin(), file.notes.end());
   prepared->source_path = path;
   prepared->source_sha256 = std::move(sha256);
   return std::move(*prepared);
@@ -26,12 +28,15 @@ Result<model::PreparedModel> prepared_from_mesh(const std::string& path, std::st
 }  // namespace
 
 Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context) {
-  ASBUILT_TRY(content, io::read_file(path));
-  std::string sha256 = io::sha256(content);
-  content = {};
+  std::string sha256;
+  {
+    ASBUILT_TRY(content, io::FileContent::open(path));
+    sha256 = io::sha256(content.view());
+  }
   LoadedModel loaded;
-  ASBUILT_TRY(prepared, model::is_prepared_file(path) ? model::load_prepared(path, context)
-                                                      : prepared_from_mesh(path, sha256, options, context));
+  ASBUILT_TRY(prepared, model::is_prepared_file(path)
+                            ? model::load_prepared(path, context)
+                            : prepared_from_file(path, sha256, options, loaded.unit, context));
   for (const std::string& note : prepared.report.notes) context.warn(fmt::format("{}: {}", path, note));
   // A prepared model is the same model as the mesh it came from.
   if (!prepared.source_sha256.empty()) sha256 = prepared.source_sha256;

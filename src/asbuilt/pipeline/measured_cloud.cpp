@@ -12,8 +12,8 @@
 namespace asbuilt::pipeline {
 namespace {
 
-Result<PointCloud> points_of(const std::string& path, io::Unit unit, const Context& context) {
-  ASBUILT_TRY(files, io::read_scans(path, unit));
+Result<PointCloud> points_of(const std::string& path, const Options& options, const Context& context) {
+  ASBUILT_TRY(files, io::read_scans(path, scan_reading(options)));
   PointCloud all;
   for (const io::ScanFile& file : files) {
     const PointCloud cloud = scan::sanitise(file.cloud, context).cloud;
@@ -32,7 +32,7 @@ Result<PointCloud> measured_cloud(const std::string& path, const LoadedModel& mo
                                   const Context& context) {
   // A file with faces is a surface: its vertices alone would say nothing of a large triangle.
   const auto mesh = io::read_mesh(path, options.scan_unit);
-  if (!mesh) return points_of(path, options.scan_unit, context);
+  if (!mesh) return points_of(path, options, context);
   return model::even_samples(*mesh, median_spacing(model.prepared.dense_samples.positions), options.seed, context);
 }
 

@@ -94,6 +94,19 @@ Result<void> Options::validate() const {
   return {};
 }
 
+io::ReadOptions scan_reading(const Options& options) {
+  io::ReadOptions reading = options.scan_unit;
+  reading.columns = options.columns;
+  reading.camera = options.camera;
+  return reading;
+}
+
+io::ModelReadOptions model_reading(const Options& options) {
+  io::ModelReadOptions reading = options.model_unit;
+  reading.tessellation_tolerance = options.tessellation_tolerance;
+  return reading;
+}
+
 Options with_paper_mode_applied(const Options& options) {
   Options applied = options;
   if (!options.paper_mode) return applied;
@@ -109,9 +122,14 @@ Options with_paper_mode_applied(const Options& options) {
 io::Options recorded(const Options& options, std::initializer_list<Half> halves) {
   const auto wanted = [&](Half half) { return std::ranges::find(halves, half) != halves.end(); };
   io::Options record;
-  if (wanted(Half::model)) record.emplace_back("unit", unit_name(options.model_unit));
+  if (wanted(Half::model)) {
+    record.emplace_back("unit", unit_name(options.model_unit));
+    record.emplace_back("tessellation_tolerance", options.tessellation_tolerance);
+  }
   if (wanted(Half::scan)) {
     record.emplace_back("scan_unit", unit_name(options.scan_unit));
+    record.emplace_back("columns", options.columns);
+    record.emplace_back("camera", options.camera);
     record.emplace_back("viewpoint", options.viewpoint);
     record.emplace_back("poses", options.poses);
     record.emplace_back("exclude", options.exclude);
@@ -150,6 +168,9 @@ Result<void> take_over(Options& options, const io::Options& record) {
   };
   ASBUILT_CHECK(assign("unit", options.model_unit));
   ASBUILT_CHECK(assign("scan_unit", options.scan_unit));
+  ASBUILT_CHECK(assign("tessellation_tolerance", options.tessellation_tolerance));
+  ASBUILT_CHECK(assign("columns", options.columns));
+  ASBUILT_CHECK(assign("camera", options.camera));
   ASBUILT_CHECK(assign("viewpoint", options.viewpoint));
   ASBUILT_CHECK(assign("poses", options.poses));
   ASBUILT_CHECK(assign("exclude", options.exclude));

@@ -12,6 +12,8 @@
 #include "asbuilt/fuse/mesh.h"
 #include "asbuilt/graph/pose_graph.h"
 #include "asbuilt/inspect/deviation.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/read_options.h"
 #include "asbuilt/io/run_record.h"
 #include "asbuilt/io/unit.h"
 #include "asbuilt/model/prepared_model.h"
@@ -31,10 +33,13 @@ enum class Instances { one, all };
 /// Everything a user can choose; the stages' own options and what lies between them.
 struct Options {
   io::Unit model_unit = io::Unit::stated, scan_unit = io::Unit::stated;
-  std::string viewpoint = "auto";    ///< auto, none, x,y,z, dir:dx,dy,dz or a CSV file with one per scan
-  std::string poses;                 ///< file with starts for detection; empty: none
-  std::vector<std::string> exclude;  ///< scans, by name or path
-  std::vector<std::string> accept;   ///< SCAN:CANDIDATE, candidates counted from 0 as in result.json
+  double tessellation_tolerance = 1e-4;  ///< of STEP, IGES and BREP models: triangles to surface / diameter
+  std::string columns;                   ///< of text scans, "x,y,z,nx,ny,nz,-,r,g,b,i"; empty: read or guessed
+  std::string camera;                    ///< of depth images, "fx,fy,cx,cy" or a file; empty: a file beside them
+  std::string viewpoint = "auto";        ///< auto, none, x,y,z, dir:dx,dy,dz or a CSV file with one per scan
+  std::string poses;                     ///< file with starts for detection; empty: none
+  std::vector<std::string> exclude;      ///< scans, by name or path
+  std::vector<std::string> accept;       ///< SCAN:CANDIDATE, candidates counted from 0 as in result.json
   Instances instances = Instances::one;
   std::uint64_t seed = 0;
   bool paper_mode = false;  ///< exactly the published method, in every stage
@@ -77,6 +82,10 @@ void for_each_stage_field(Options& options, Visitor&& field) {
   for_each_field(options.surface_mesh, of(Half::joint, "mesh_"));
   for_each_field(options.inspect, of(Half::joint, "inspect_"));
 }
+
+/// How scans and models are read.
+[[nodiscard]] io::ReadOptions scan_reading(const Options& options);
+[[nodiscard]] io::ModelReadOptions model_reading(const Options& options);
 
 /// The options with paper mode handed down to every stage.
 [[nodiscard]] Options with_paper_mode_applied(const Options& options);

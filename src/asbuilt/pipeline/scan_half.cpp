@@ -29,12 +29,9 @@ struct InputFile {
 };
 
 InputFile read_input(const std::string& path, const Options& options) {
-  auto content = io::read_file(path);
+  const auto content = io::FileContent::open(path);
   if (!content) return {path, "", tl::unexpected(content.error())};
-  std::string sha256 = io::sha256(*content);
-  content->clear();
-  content->shrink_to_fit();
-  return {path, std::move(sha256), io::read_scans(path, options.scan_unit)};
+  return {path, io::sha256(content->view()), io::scans_in(path, content->view(), scan_reading(options))};
 }
 
 io::ScanRecord failed_record(const std::string& path, std::string name, const Error& error) {
@@ -263,28 +260,42 @@ class ScanHalfRun {
   const Context& context_;
 };
 
-/// When nothing was found anywhere, a mistaken unit is the likeliest cause: says so if it is.
+/// Median spacing of the scans in which the part was found; 0 where it was found in none.
+double spacing_of_found(const io::RunRecord& record) {
+  std::vector<double> spacings;
+  for (const io::ScanRecord& scan : record.scans) {
+    const bool found = scan.status == io::ScanStatus::accepted || scan.status == io::ScanStatus::ambiguous;
+    if (found && scan.spacing > 0.0) spacings.push_back(scan.spacing);
+  }
+  if (spacings.empty()) return 0.0;
+  std::ranges::nth_element(spacings, spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2));
+  return spacings[spacings.size() / 2];
+}
+
+/// When nothing was found anywhere, a mistaken unit is the likeliest cause: says so if it is. Where the part was found
+/// in other scans, only one whose points lie far closer or far wider than theirs is suspected.
 void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder, const Context& context) {
-  const bool found_something = std::ranges::any_of(record.scans, [](const io::ScanRecord& scan) {
-    return scan.status == io::ScanStatus::accepted || scan.status == io::ScanStatus::ambiguous;
-  });
-  if (found_something) return;
+  constexpr double kFarOff = 5.0;
+  const double usual_spacing = spacing_of_found(record);
   std::size_t tried = 0;
   for (io::ScanRecord& scan : record.scans) {
+    const double ratio = usual_spacing > 0.0 ? scan.spacing / usual_spacing : 0.0;
+    if (usual_spacing > 0.0 && ratio > 1.0 / kFarOff && ratio < kFarOff) continue;
     if (scan.status != io::ScanStatus::rejected || scan.points == 0 || scan.reason_code == "excluded") continue;
     if (scan.reason_code == "scan_too_small" || scan.reason_code == "wrong_unit") continue;
     if (tried++ == kScansTriedWithOtherUnits || context.cancelled()) return;
     const auto timed = folder.stage("try_units", scan.name);
-    const auto files = io::read_scans(scan.path, half.options.scan_unit);
+    const auto files = io::read_scans(scan.path, scan_reading(half.options));
     if (!files || static_cast<std::size_t>(scan.index_in_file) >= files->size()) continue;
-    const auto factor = factor_that_finds_the_part((*files)[static_cast<std::size_t>(scan.index_in_file)],
-                                                   half.model.prepared, half.codebook, half.options, context);
+    const io::ScanFile& file = (*files)[static_cast<std::size_t>(scan.index_in_file)];
+    const auto factor = factor_that_finds_the_part(file, half.model.prepared, half.codebook, half.options, context);
     if (!factor) continue;
     scan.reason_code = verify::code_of(verify::Reason::wrong_unit);
-    scan.reason =
-        fmt::format("the part is not there at this size, but it is when the scan is {:g} times as large: try {}",
-                    *factor, flag_for_factor(*factor, half.options));
-    return;
+    scan.reason = fmt::format(
+        "the part is not there at this size, but it is when the scan is {:g} times as large: try {}{}", *factor,
+        flag_for_factor(*factor, with_units_read(half, file)),
+        usual_spacing > 0.0 ? " for this scan alone, in a detect run of its own that register then joins" : "");
+    if (usual_spacing == 0.0) return;
   }
 }
 

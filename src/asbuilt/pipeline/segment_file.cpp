@@ -32,7 +32,8 @@ Eigen::Vector3f turned_outwards(const Eigen::Vector3f& normal_in_scan, const Eig
 
 }  // namespace
 
-Segment cut_out(const scan::Scan& scan, const verify::Detection& detection, const model::PreparedModel& model) {
+Segment cut_out(const scan::Scan& scan, const io::ScanFile& file, const verify::Detection& detection,
+                const model::PreparedModel& model) {
   std::vector<std::uint32_t> indices;
   std::ranges::merge(detection.segment, detection.margin_points, std::back_inserter(indices));
   Segment segment;
@@ -42,6 +43,8 @@ Segment cut_out(const scan::Scan& scan, const verify::Detection& detection, cons
     segment.cloud.positions.push_back(position);
     segment.cloud.normals.push_back(
         scan.normals_oriented ? normal : turned_outwards(normal, position, detection.best.model_from_scan, model));
+    if (!file.colours.empty()) segment.colours.push_back(file.colours[scan.source_index[i]]);
+    if (!file.intensities.empty()) segment.intensities.push_back(file.intensities[scan.source_index[i]]);
     segment.is_part.push_back(std::ranges::binary_search(detection.segment, i) ? 1 : 0);
   }
   return segment;
@@ -70,6 +73,15 @@ Result<void> write_segment(const std::filesystem::path& path, const Segment& seg
     columns.push_back({kNormalNames[axis], std::span<const float>(normal_columns[axis])});
   }
   columns.push_back({"part", std::span<const std::uint8_t>(segment.is_part)});
+  std::array<std::vector<std::uint8_t>, 3> channels;
+  constexpr std::array<const char*, 3> kChannelNames{"red", "green", "blue"};
+  for (std::size_t c = 0; c < 3 && !segment.colours.empty(); ++c) {
+    for (const io::Rgb& rgb : segment.colours) channels[c].push_back(rgb[c]);
+    columns.push_back({kChannelNames[c], std::span<const std::uint8_t>(channels[c])});
+  }
+  if (!segment.intensities.empty()) {
+    columns.push_back({"intensity", std::span<const float>(segment.intensities)});
+  }
   const std::vector<std::string> comments{"asbuilt segment: scan frame, mm; part 1, margin 0"};
   return io::write_ply(path, columns, comments);
 }

@@ -8,6 +8,7 @@
 
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/result.h"
+#include "asbuilt/io/scan_file.h"
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/scan/scan.h"
 #include "asbuilt/verify/detection.h"
@@ -19,11 +20,14 @@ namespace asbuilt::pipeline {
 struct Segment {
   PointCloud cloud;
   std::vector<std::uint8_t> is_part;  ///< one per point: 1 part, 0 margin
+  std::vector<io::Rgb> colours;       ///< empty or one per point, from the scan's file
+  std::vector<float> intensities;     ///< likewise
 };
 
 /// Cuts segment and margin out of a scan. Where the scan's own normals have no trustworthy sign, they take that of the
 /// model's surface next to them, which is known once the pose is.
-[[nodiscard]] Segment cut_out(const scan::Scan& scan, const verify::Detection& detection,
+/// Colours and intensities come along from the file.
+[[nodiscard]] Segment cut_out(const scan::Scan& scan, const io::ScanFile& file, const verify::Detection& detection,
                               const model::PreparedModel& model);
 
 /// Positions are written as double where there is an offset, in the coordinates of the scan's file (mm) always.
