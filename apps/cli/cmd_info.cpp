@@ -24,14 +24,16 @@ using Json = nlohmann::ordered_json;
 
 struct Arguments {
   std::vector<std::string> files;
-  io::Unit unit = io::Unit::stated;
+  io::ReadOptions reading;
 };
 
 struct ScanInfo {
-  std::string name;
+  std::string name, title;
   std::size_t points = 0;
   std::optional<Eigen::Vector3d> viewpoint;
-  bool has_pose = false, has_normals = false, has_grid = false;
+  bool has_pose = false, has_normals = false;
+  std::optional<io::ScanGrid> grid;
+  bool has_colours = false, has_intensities = false;
 };
 
 struct FileInfo {
@@ -50,10 +52,14 @@ Json vector_json(const Eigen::Vector3d& v) {
 void add_scan(FileInfo& info, const io::ScanFile& file, const Context& context) {
   const scan::Sanitised sane = scan::sanitise(file.cloud, context);
   info.points += sane.cloud.size();
-  for (const Eigen::Vector3f& position : sane.cloud.positions)
-    info.box.extend(position.cast<double>() + file.offset_mm);
-  info.scans.push_back({file.name, sane.cloud.size(), file.viewpoint_mm, file.viewpoint_mm.has_value(),
-                        file.cloud.has_normals(), false});
+  // Several scans are told as large as they are together, where the file's poses place them.
+  const Pose placed = file.file_from_scan.value_or(Pose::Identity());
+  for (const Eigen::Vector3f& position : sane.cloud.positions) {
+    info.box.extend(placed * (position.cast<double>() + file.offset_mm));
+  }
+  info.scans.push_back({file.name, file.title, sane.cloud.size(), file.viewpoint_mm, file.file_from_scan.has_value(),
+                        file.cloud.has_normals(), file.grid, !file.colours.empty(), !file.intensities.empty()});
+  info.unit = io::name_of(file.unit);
   info.notes.insert(info.notes.end(), file.notes.begin(), file.notes.end());
   const std::size_t removed = file.cloud.size() - sane.cloud.size();
   if (removed > 0) {
@@ -74,7 +80,7 @@ Result<void> describe_result(FileInfo& info, const std::filesystem::path& file) 
   info.format = fmt::format("asbuilt result, schema {}", io::RunRecord::kSchema);
   for (const io::ScanRecord& scan : record.scans) {
     info.points += scan.points;
-    info.scans.push_back({scan.name, scan.points, scan.viewpoint, scan.model_from_scan.has_value(), false, false});
+    info.scans.push_back({scan.name, "", scan.points, scan.viewpoint, scan.model_from_scan.has_value(), false, {}});
   }
   info.notes.push_back(fmt::format("state {}, model {} (diameter {:.6g} mm)", io::name_of(record.state),
                                    record.model.path, record.model.diameter));
@@ -96,37 +102,34 @@ Result<void> describe_prepared(FileInfo& info, const Context& context) {
   return {};
 }
 
-/// "stl", in lower case.
-std::string extension_of(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  if (extension.starts_with('.')) extension.erase(0, 1);
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+void describe_model(FileInfo& info, const io::ModelFile& model) {
+  info.kind = model.is_cad ? "cad" : "mesh";
+  info.format = model.format;
+  info.unit = io::name_of(model.unit);
+  info.points = model.mesh.vertices.size();
+  describe_mesh(info, model.mesh);
+  info.notes.insert(info.notes.end(), model.notes.begin(), model.notes.end());
+  if (!model.is_cad) return;
+  info.points = 0;  // surfaces have none
+  info.notes.push_back(fmt::format("{} CAD faces of {} bodies, here as triangles", model.cad_faces, model.cad_parts));
 }
 
-Result<void> describe(FileInfo& info, io::Unit unit, const Context& context) {
+Result<void> describe(FileInfo& info, const Arguments& arguments, const Context& context) {
   const std::filesystem::path path(info.path);
   if (std::filesystem::is_directory(path)) return describe_result(info, path / "result.json");
   if (path.filename() == "result.json") return describe_result(info, path);
   if (model::is_prepared_file(path)) return describe_prepared(info, context);
-  if (unit != io::Unit::stated) info.unit = io::name_of(unit);
 
   // A file may be both: structured-light software exports scans as meshes.
-  const auto mesh = io::read_mesh(path, unit);
-  const auto scans = io::read_scans(path, unit);
-  if (!mesh && !scans) {
-    const bool is_mesh_format =
-        extension_of(info.path) == "stl" || extension_of(info.path) == "off" || extension_of(info.path) == "obj";
-    return tl::unexpected(is_mesh_format ? mesh.error() : scans.error());
-  }
-  info.kind = mesh ? "mesh" : "scan";
-  info.format = scans && !scans->empty() ? scans->front().format : extension_of(info.path);
-  if (scans) {
-    for (const io::ScanFile& file : *scans) add_scan(info, file, context);
-  }
-  if (mesh) describe_mesh(info, *mesh);
-  if (mesh && !scans) info.points = mesh->vertices.size();
+  const auto model = io::read_model(path, arguments.reading.unit);
+  if (model) describe_model(info, *model);
+  if (model && model->is_cad) return {};
+  const auto scans = io::read_scans(path, arguments.reading);
+  if (!scans) return tl::unexpected(io::is_model_name(path) && !model ? model.error() : scans.error());
+  info.points = 0;
+  for (const io::ScanFile& file : *scans) add_scan(info, file, context);
+  if (!model) info.kind = "scan";
+  info.format = scans->front().format;
   return {};
 }
 
@@ -139,7 +142,10 @@ Json json_of(const FileInfo& info) {
                      {"viewpoint", scan.viewpoint ? vector_json(*scan.viewpoint) : Json(nullptr)},
                      {"has_pose", scan.has_pose},
                      {"has_normals", scan.has_normals},
-                     {"has_grid", scan.has_grid}});
+                     {"has_grid", scan.grid.has_value()},
+                     {"title", scan.title},
+                     {"has_colours", scan.has_colours},
+                     {"has_intensities", scan.has_intensities}});
   }
   const Eigen::Vector3d extent = info.box.isEmpty() ? Eigen::Vector3d::Zero().eval() : info.box.sizes().eval();
   return {{"path", info.path},
@@ -153,6 +159,12 @@ Json json_of(const FileInfo& info) {
           {"notes", info.notes}};
 }
 
+/// What a file calls something, for a terminal: no control characters.
+std::string printable(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  return text.substr(0, 60);
+}
+
 std::string lines_of(const FileInfo& info) {
   if (!info.error.empty()) return {};  // told on standard error
   const Eigen::Vector3d extent = info.box.isEmpty() ? Eigen::Vector3d::Zero().eval() : info.box.sizes().eval();
@@ -163,8 +175,12 @@ std::string lines_of(const FileInfo& info) {
     const std::string viewpoint = scan.viewpoint ? fmt::format("{:.4g}, {:.4g}, {:.4g}", scan.viewpoint->x(),
                                                                scan.viewpoint->y(), scan.viewpoint->z())
                                                  : "not stated";
-    text += fmt::format("  scan {}: {} points, viewpoint {}, normals {}\n", scan.name, scan.points, viewpoint,
-                        scan.has_normals ? "yes" : "no");
+    text += fmt::format("  scan {}: {} points, viewpoint {}, normals {}{}{}{}{}{}\n", scan.name, scan.points, viewpoint,
+                        scan.has_normals ? "yes" : "no", scan.has_colours ? ", colour" : "",
+                        scan.has_intensities ? ", intensity" : "",
+                        scan.grid ? fmt::format(", grid of {} x {}", scan.grid->rows, scan.grid->columns) : "",
+                        scan.has_pose ? ", with a pose" : "",
+                        scan.title.empty() ? "" : fmt::format(", called {}", printable(scan.title)));
   }
   for (const std::string& note : info.notes) text += fmt::format("  note: {}\n", note);
   return text;
@@ -177,7 +193,7 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   for (const std::string& path : arguments.files) {
     FileInfo info;
     info.path = path;
-    if (const auto described = describe(info, arguments.unit, shell.context()); !described) {
+    if (const auto described = describe(info, arguments, shell.context()); !described) {
       info.error = described.error().message;
       shell.finish(described.error());
       code = kNoReadableInput;
@@ -196,7 +212,9 @@ void add_info_command(CLI::App& app, Shell& shell) {
   CLI::App* command = app.add_subcommand("info", "What a file holds: kind, points, extent, unit, normals, viewpoint");
   auto arguments = std::make_shared<Arguments>();
   command->add_option("FILE", arguments->files, "Scans, meshes, prepared models, results")->required();
-  add_unit_option(*command, "--unit", arguments->unit, "Unit of the files: mm, cm, m, inch or foot");
+  add_unit_option(*command, "--unit", arguments->reading.unit, "Unit of the files: mm, cm, m, inch or foot");
+  command->add_option("--columns", arguments->reading.columns, "Columns of text scans, as for reconstruct");
+  command->add_option("--camera", arguments->reading.camera, "Camera of depth images, as for reconstruct");
   add_common_options(*command, shell, false);
   command->footer(
       "Examples:\n"
