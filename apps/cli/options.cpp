@@ -27,6 +27,11 @@ std::string group_of(Half half) {
 
 void add_scan_options(CLI::App& command, pipeline::Options& options) {
   add_unit_option(command, "--scan-unit", options.scan_unit, "Unit of the scans: mm, cm, m, inch or foot");
+  command.add_option(
+      "--columns", options.columns,
+      "Columns of text scans, out of x y z nx ny nz r g b i, with - for others: for example x,y,z,-,r,g,b");
+  command.add_option("--camera", options.camera,
+                     "Camera of depth images: fx,fy,cx,cy in pixels (and the steps of depth in a unit), or a file");
   command
       .add_option("--viewpoint", options.viewpoint,
                   "Where the sensor stood, in the scan's coordinates: auto, none, x,y,z, dir:dx,dy,dz, or a CSV file "
@@ -131,6 +136,11 @@ void add_pipeline_options(CLI::App& command, pipeline::Options& options, std::in
   const auto wanted = [&](Half half) { return std::ranges::find(halves, half) != halves.end(); };
   if (wanted(Half::model)) {
     add_unit_option(command, "--unit", options.model_unit, "Unit of the model: mm, cm, m, inch or foot");
+    command
+        .add_option("--tessellation-tolerance", options.tessellation_tolerance,
+                    "STEP, IGES, BREP: how far triangles may stray from the surface, as a share of the diameter")
+        ->check(CLI::Range(1e-6, 0.05))
+        ->capture_default_str();
   }
   if (wanted(Half::scan)) add_scan_options(command, options);
   if (wanted(Half::scan) || wanted(Half::joint)) {
