@@ -68,6 +68,16 @@ absent nobody
 expect 0 detect "$model" scene/scan_00.ply -o vouched --accept scan_00:0
 [ "$(field_of vouched scan_00 reason_code)" = accepted_by_user ] || fail "--accept was not written down"
 
+# ---- other software goes on with it, and so do we
+expect 0 export r1 -o poses.csv
+[ "$(wc -l <poses.csv)" -eq 4 ] || fail "poses.csv has $(wc -l <poses.csv) lines, expected a header and three poses"
+expect 0 detect "$model" scene/scan_00.ply -o again --poses poses.csv
+expect 0 export r1 -o aligned.e57
+expect 0 info aligned.e57 --json
+[ "$(grep -c '"has_pose": true' stdout)" -eq 3 ] || fail "aligned.e57 does not hold three scans with poses"
+expect 4 export r1 -o aligned.e57
+expect 2 export r1 -o aligned.doc
+
 # ---- words and figures
 expect 0 explain r1
 grep -q 'scan_00 .* is accepted' stdout || fail "explain does not say what became of a scan"

@@ -7,6 +7,9 @@
 #include <vector>
 
 #include "unit/io/bytes.h"
+#include "unit/io/e57_bytes.h"
+#include "unit/io/las_bytes.h"
+#include "unit/io/png_bytes.h"
 
 namespace asbuilt::test {
 
@@ -81,6 +84,38 @@ inline std::string stl_binary_seed() {
   return content;
 }
 
+/// Two scans: bits, a colour, an invalid state, a pose; then spherical coordinates with a grid.
+inline std::string e57_seed() {
+  E57Builder file;
+  file.add_scan(
+      R"(<cartesianX type="ScaledInteger" minimum="-3" maximum="28" scale="0.1"/>)"
+      R"(<cartesianY type="Float" precision="single"/><cartesianZ type="Float"/>)"
+      R"(<cartesianInvalidState type="Integer" minimum="0" maximum="2"/>)"
+      R"(<colorRed type="Integer" minimum="0" maximum="255"/><colorGreen type="Integer" minimum="0" maximum="255"/>)"
+      R"(<colorBlue type="Integer" minimum="0" maximum="255"/>)",
+      3,
+      {{packed({1, 2, 3}, 5), little(1.f) + little(2.f) + little(3.f), little(4.0) + little(5.0) + little(6.0),
+        packed({0, 2, 0}, 2), "abc", "def", "ghi"}},
+      2,
+      R"(<name type="String"><![CDATA[a]]></name><pose type="Structure"><rotation type="Structure">)"
+      R"(<w type="Float">1</w></rotation><translation type="Structure"><x type="Float">5</x></translation></pose>)");
+  const std::string two = little(1.0) + little(2.0);
+  file.add_scan(
+      R"(<sphericalRange type="Float"/><sphericalAzimuth type="Float"/><sphericalElevation type="Float"/>)"
+      R"(<rowIndex type="Integer" minimum="0" maximum="7"/><columnIndex type="Integer" minimum="0" maximum="7"/>)"
+      R"(<intensity type="Float" precision="single"/>)",
+      2, {{two, two, two, packed({0, 1}, 3), packed({2, 5}, 3), little(0.5f) + little(0.25f)}});
+  return file.bytes();
+}
+
+inline std::string ptx_seed() {
+  const std::string scan =
+      "2\n1\n1 2 3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 2 3 1\n4 5 6 0.5 10 20 30\n0 0 0 0.5 0 0 0\n";
+  return scan + scan;
+}
+
+inline std::string depth_seed() { return png(2, 3, std::string("\0\x03\xe8\x03\xe9\1\x03\xe8\0\2\4\0\1\0\1", 15)); }
+
 inline std::vector<Seed> seeds() {
   return {
       {"ply", "ascii.ply", ply_ascii_seed(), 4, true, true},
@@ -104,6 +139,12 @@ inline std::vector<Seed> seeds() {
       {"mesh", "quad.off", "OFF # seed\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n", 4, true, true},
       {"mesh", "quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 -2//1 \\\n 4//1\n", 4, true,
        false},
+      {"e57", "two.e57", e57_seed(), 5, false, true},
+      {"ptx", "two.ptx", ptx_seed(), 4, false, false},
+      {"las", "two.las", las(3, 2), 3, false, true},
+      {"las", "four.las", las(7, 4), 3, false, true},
+      {"depth", "depth.png", depth_seed(), 6, false, true},
+      {"gzip", "scan.xyz.gz", gzipped("1 2 3\n4 5 6\n"), 2, false, true},
       {"pose", "poses.csv", "name,matrix\na,0,-1,0,1,1,0,0,2,0,0,1,3,0,0,0,1\n"},
       {"pose", "poses.json", R"([{"scan": "a", "model_from_scan": [[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]}])"},
       {"pose", "viewpoints.csv", "name,x,y,z\na,1,2,3\nb,4,5,6\n"},

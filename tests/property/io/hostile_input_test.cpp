@@ -30,7 +30,7 @@ TEST(HostileInput, EverySeedIsValid) {
     } else if (is_pose_file(seed)) {
       EXPECT_TRUE(io::poses_from(input, io::Unit::stated)) << seed.name;
     } else {
-      const auto scans = io::scans_from(seed.name, input, io::Unit::stated);
+      const auto scans = io::scans_in(seed.name, seed.content, reading(io::Unit::stated));
       ASSERT_TRUE(scans) << scans.error().message;
       EXPECT_EQ(points_of(*scans), seed.points) << seed.name;
       for (const std::string& note : scans->front().notes) {
@@ -49,12 +49,12 @@ bool tells_of_the_cut(const std::vector<io::ScanFile>& scans, const std::vector<
 TEST(HostileInput, ASeedCutAtAnyByteIsAnErrorOrAReportedPartialRead) {
   for (const Seed& seed : seeds()) {
     if (is_pose_file(seed)) continue;
-    const auto whole = io::scans_from(seed.name, {seed.name, seed.content}, io::Unit::stated);
+    const auto whole = io::scans_in(seed.name, seed.content, reading(io::Unit::stated));
     for (std::size_t length = 0; length < seed.content.size(); ++length) {
       const std::string cut = seed.content.substr(0, length);
       SCOPED_TRACE(seed.name + " cut after " + std::to_string(length) + " of " + std::to_string(seed.content.size()));
       ASSERT_NO_THROW(read_in_every_way(seed.name, cut));
-      const auto scans = io::scans_from(seed.name, {seed.name, cut}, io::Unit::stated);
+      const auto scans = io::scans_in(seed.name, cut, reading(io::Unit::stated));
       if (!scans) continue;
       // A text that declares no count and ends with a line is whole as far as anyone can tell.
       if (!seed.declares_count && cut.ends_with('\n')) continue;
@@ -86,7 +86,7 @@ TEST(HostileInput, AFileCutWithinItsPointsSaysHowManyOfHowManyThereAre) {
     if (seed.name != "binary.pcd" && seed.name != "little.ply" && seed.name != "big.ply") continue;
     // Both kinds end their vertices at a known byte: the file is cut one byte before.
     const std::size_t end = seed.family == "pcd" ? seed.content.size() : seed.content.size() - 2 * 2 - 7 * 4;
-    const auto scans = io::scans_from(seed.name, {seed.name, seed.content.substr(0, end - 1)}, io::Unit::stated);
+    const auto scans = io::scans_in(seed.name, seed.content.substr(0, end - 1), reading(io::Unit::stated));
     ASSERT_FALSE(scans) << seed.name;
     EXPECT_THAT(scans.error().message, ::testing::HasSubstr("the file ends after 3 of 4")) << seed.name;
   }
@@ -147,11 +147,22 @@ TEST(HostileInput, MutatedFilesGiveAnErrorOrSoundValues) {
   }
 }
 
+TEST(HostileInput, MutatedE57FilesWhoseChecksumsAreRepairedGiveAnErrorOrSoundValues) {
+  const std::string seed = e57_seed();
+  for (std::size_t i = 0; i < 4000; ++i) {
+    Random random(1, "e57 with checksums", i);
+    std::string content = mutated(seed, random);
+    content.resize((content.size() + 1023) / 1024 * 1024, '\0');
+    repair_checksums(content);
+    ASSERT_NO_THROW(require_sound(io::scans_in("two.e57", content, io::Unit::stated))) << "mutation " << i;
+  }
+}
+
 TEST(HostileInput, WhatOnceFailedNoLongerDoes) {
   for (const auto& entry : std::filesystem::directory_iterator(ASBUILT_FOUND_INPUTS)) {
     std::ifstream stream(entry.path(), std::ios::binary);
     const std::string content{std::istreambuf_iterator<char>(stream), {}};
-    for (const char* extension : {".ply", ".pcd", ".xyz", ".stl", ".off", ".obj"}) {
+    for (const char* extension : {".ply", ".pcd", ".xyz", ".stl", ".off", ".obj", ".e57", ".ptx", ".las", ".png"}) {
       ASSERT_NO_THROW(read_in_every_way(std::string("found") + extension, content)) << entry.path();
     }
     const io::Input input{"found", content};
