@@ -114,7 +114,7 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     const std::vector<refine::Link> links = links_among(graph, members);
     ASBUILT_TRY(refinement, refine::refine(together, links, options, context));
     ASBUILT_TRY(suspect, contradicted(together, links, refinement, context));
-    if (suspect >= 0) {
+    if (suspect >= 0 && round > 1) {
       const int at = members[static_cast<std::size_t>(suspect)];
       run.dropped.push_back(left[static_cast<std::size_t>(at)]);
       left.erase(left.begin() + at);

@@ -76,7 +76,8 @@ Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel
   registration.graph = std::move(first_graph);
   for (int round = 1;; ++round) {
     ASBUILT_TRY(contradiction, refine_all(registration, scans, model, options, folder, context));
-    if (contradiction) {
+    // Rough starts leave a graph with gaps, in which a scan may have gone astray that a better one brings back.
+    if (contradiction && round > 1) {
       drop(scans, *contradiction, record, context);
       for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
       ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
@@ -85,7 +86,7 @@ Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel
       continue;
     }
     if (options.paper_mode || round == kMostRounds) return registration;
-    if (round == 1) {
+    if (round == 1 && !contradiction) {
       for (const RefinedComponent& component : registration.components) {
         ASBUILT_CHECK(remove_seen_through(component, scans, context));
       }
