@@ -4,7 +4,7 @@
 #include <span>
 #include <utility>
 
-#include "asbuilt/detect/detect.h"
+#include "asbuilt/pipeline/find_part.h"
 #include "asbuilt/pipeline/scan_hints.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/scan/scan.h"
@@ -29,6 +29,7 @@ void note(CaseRecord& record, const verify::Detection& detection) {
   record.residual_ratio = best.residual_ratio;
   record.weakest_direction = best.weakest_direction;
   record.slip_lead = best.slip_lead;
+  record.loose_directions = best.loose_directions;
   record.overrun_share = best.overrun_share;
   record.explained_samples = best.explained_samples;
 }
@@ -69,24 +70,19 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
     return note_failure(record, verify::code_of(verify::Reason::scan_too_small), *contradiction), Result<void>{};
   }
   const model::PreparedModel& model = prepared.model;
-  detect::SampledScan sampled;
-  std::vector<detect::Hypothesis> hypotheses;
-  {
-    const Timed timed(record.detect);
-    sampled = detect::sampled_scan(*scan, model.sampling_distance, model.diameter, context);
-    ASBUILT_TRY(found, detect::find_hypotheses(*scan, sampled, *prepared.codebook, options.detect, context));
-    hypotheses = std::move(found);
-  }
-  Result<verify::Detection> detection;
-  {
-    const Timed timed(record.verify);
-    detection = verify::verify(*scan, model, hypotheses, options.verify, context, false, {}, &sampled);
-  }
-  if (!detection) return tl::unexpected(detection.error());
-  note(record, *detection);
-  if (!detection->candidates.empty()) {
-    record.best = judged(detection->best.model_from_scan, scan_of_case.model_from_scan, part);
-    record.best.score = detection->best.score;
+  const pipeline::TimedStage timed = [&](std::string_view stage, const std::function<void()>& work) {
+    const Timed taken(stage == "detect" ? record.detect : record.verify);
+    work();
+  };
+  ASBUILT_TRY(found, pipeline::find_part(*scan, model, *prepared.codebook, {}, options, timed, context));
+  const verify::Detection& detection = found.placements.front();
+  const std::vector<detect::Hypothesis>& hypotheses = found.hypotheses;
+  record.votes_cast = found.votes_cast;
+  record.looks = found.looks;
+  note(record, detection);
+  if (!detection.candidates.empty()) {
+    record.best = judged(detection.best.model_from_scan, scan_of_case.model_from_scan, part);
+    record.best.score = detection.best.score;
   }
 
   if (record.present() && !record.found() && scan_of_case.model_from_scan) {

@@ -63,6 +63,9 @@ void for_each_field(Record& record, Visitor&& field) {
   field("slip_lead", record.slip_lead);
   field("overrun_share", record.overrun_share);
   field("explained_samples", record.explained_samples);
+  field("loose_directions", record.loose_directions);
+  field("votes_cast", record.votes_cast);
+  field("looks", record.looks);
   field("hypotheses", record.hypotheses);
   field("right_rank", record.right_rank);
   field("verdict_on_truth", record.verdict_on_truth);

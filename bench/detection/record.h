@@ -56,15 +56,17 @@ struct CaseRecord {
   Judged best;        ///< the best candidate, whatever its status; score: ours
   Judged unverified;  ///< the cluster with most votes, registered; score: its votes
   double votes = 0.0, support = 0.0, visible_share = 0.0, normal_agreement = 0.0, contradiction_share = 0.0,
-         hidden_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0,
-         slip_lead = 0.0, overrun_share = 0.0;
+         hidden_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0, slip_lead = 0.0, overrun_share = 0.0;
   int explained_samples = 0;
+  int loose_directions = 0;
+  std::uint64_t votes_cast = 0;  ///< by all reference points
+  int looks = 0;                 ///< 1: few reference points were enough
   std::size_t hypotheses = 0;
   std::optional<std::size_t> right_rank;  ///< of the first hypothesis near the truth, before verification, from 0
   /// For a part that was not found: what verification says of the true pose alone, "accepted" or its reason's code. So
   /// one knows whether detection or verification missed it. Empty for all others.
   std::string verdict_on_truth;
-  StepTime prepare_model;                 ///< once for all scans of the part
+  StepTime prepare_model;  ///< once for all scans of the part
   StepTime prepare_scan, detect, verify;
 
   [[nodiscard]] bool present() const { return content == "part"; }

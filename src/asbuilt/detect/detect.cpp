@@ -12,14 +12,11 @@ namespace asbuilt::detect {
 namespace {
 
 // A random draw without repetition: a stride over the order of the points would follow the scanner's lines.
-std::vector<std::uint32_t> reference_points(std::size_t samples, int wanted) {
+std::vector<std::uint32_t> drawn_order(std::size_t samples) {
   std::vector<std::uint32_t> order(samples);
   std::iota(order.begin(), order.end(), 0U);
-  const std::size_t count = std::min(samples, static_cast<std::size_t>(wanted));
   Random random(0, "reference points", samples);
-  for (std::size_t i = 0; i < count; ++i) std::swap(order[i], order[i + random.below(samples - i)]);
-  order.resize(count);
-  std::ranges::sort(order);
+  for (std::size_t i = 0; i < samples; ++i) std::swap(order[i], order[i + random.below(samples - i)]);
   return order;
 }
 
@@ -59,28 +56,47 @@ Result<std::vector<Hypothesis>> find_hypotheses(const scan::Scan& scan, const Sa
                                                 const Codebook& codebook, const DetectOptions& options,
                                                 const Context& context) {
   ASBUILT_CHECK(options.validate());
-  const Scene scene = detection_scene(scan, sampled, options);
-  const std::vector<std::uint32_t> references = reference_points(scene.samples.size(), options.reference_points);
-  // Without a known sign both sides of the reference are tried.
-  const std::size_t signs = scene.normals_oriented ? 1 : 2;
+  HypothesisSearch search(scan, sampled, codebook, options);
+  ASBUILT_CHECK(search.vote(options.reference_points, context));
+  return search.hypotheses(options.max_hypotheses, context);
+}
 
-  std::vector<std::vector<Hypothesis>> found(references.size() * signs);
+HypothesisSearch::HypothesisSearch(const scan::Scan& scan, const SampledScan& sampled, const Codebook& codebook,
+                                   const DetectOptions& options)
+    : codebook_(codebook),
+      options_(options),
+      scene_(detection_scene(scan, sampled, options)),
+      order_(drawn_order(scene_.samples.size())) {}
+
+Result<void> HypothesisSearch::vote(int wanted, const Context& context) {
+  const std::size_t last = std::min(static_cast<std::size_t>(wanted), order_.size());
+  if (last <= voted_) return {};
+  // Without a known sign both sides of the reference are tried.
+  const std::size_t signs = scene_.normals_oriented ? 1 : 2;
+  std::vector<std::vector<Hypothesis>> found((last - voted_) * signs);
+  std::vector<std::uint64_t> cast(found.size());
   parallel_for_blocks(context, found.size(), 16, [&](std::size_t begin, std::size_t end) {
-    LocalVoting voting(codebook, scene, options);
+    LocalVoting voting(codebook_, scene_, options_);
     for (std::size_t i = begin; i < end && !context.cancelled(); ++i) {
-      const std::uint32_t reference = references[i / signs];
+      const std::uint32_t reference = order_[voted_ + i / signs];
       const float sign = i % signs == 0 ? 1.0F : -1.0F;
-      const Pose frame = local_frame(scene.samples.positions[reference], sign * scene.samples.normals[reference]);
-      found[i] = hypotheses_of(voting.vote(reference, sign), codebook, frame);
+      const Pose frame = local_frame(scene_.samples.positions[reference], sign * scene_.samples.normals[reference]);
+      const std::uint64_t before = voting.votes_cast();
+      found[i] = hypotheses_of(voting.vote(reference, sign), codebook_, frame);
+      cast[i] = voting.votes_cast() - before;
     }
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while detecting");
+  for (const std::vector<Hypothesis>& some : found) found_.insert(found_.end(), some.begin(), some.end());
+  votes_cast_ = std::accumulate(cast.begin(), cast.end(), votes_cast_);
+  voted_ = last;
+  return {};
+}
 
-  std::vector<Hypothesis> all;
-  for (const std::vector<Hypothesis>& some : found) all.insert(all.end(), some.begin(), some.end());
-  const ClusterOptions cluster{options.cluster_angle_deg * std::numbers::pi / 180.0,
-                               options.cluster_distance_ratio * codebook.diameter, options.max_hypotheses};
-  return cluster_poses(all, codebook.centre, cluster, context);
+std::vector<Hypothesis> HypothesisSearch::hypotheses(int most, const Context& context) const {
+  const ClusterOptions cluster{options_.cluster_angle_deg * std::numbers::pi / 180.0,
+                               options_.cluster_distance_ratio * codebook_.diameter, most};
+  return cluster_poses(found_, codebook_.centre, cluster, context);
 }
 
 }  // namespace asbuilt::detect

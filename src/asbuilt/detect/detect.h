@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "asbuilt/core/context.h"
@@ -20,7 +22,34 @@ namespace asbuilt::detect {
                                     const Context& context);
 [[nodiscard]] Scene detection_scene(const scan::Scan& scan, const SampledScan& sampled, const DetectOptions& options);
 
-/// Where the part may stand in a scan: local voting per scene reference point (Eq. 6-10), then pose clusters.
+/// Local voting per scene reference point (Eq. 6-10), then pose clusters; it can be gone on with: the more reference
+/// points have voted, the smaller a part it finds. They are a random draw, the first of which are the same however many
+/// follow, and results depend on their number alone, not on the steps in which they voted or on threads.
+class HypothesisSearch {
+ public:
+  /// `codebook` has to outlive it; `sampled` was taken with its sampling distance and diameter.
+  HypothesisSearch(const scan::Scan& scan, const SampledScan& sampled, const Codebook& codebook,
+                   const DetectOptions& options);
+
+  /// Lets further reference points vote, until `wanted` have or there are no more. Errors: cancelled.
+  [[nodiscard]] Result<void> vote(int wanted, const Context& context);
+
+  /// The at most `most` strongest clusters of what has been voted for, by decreasing votes.
+  [[nodiscard]] std::vector<Hypothesis> hypotheses(int most, const Context& context) const;
+
+  [[nodiscard]] std::uint64_t votes_cast() const { return votes_cast_; }
+
+ private:
+  const Codebook& codebook_;
+  DetectOptions options_;
+  Scene scene_;
+  std::vector<std::uint32_t> order_;  // of the reference points
+  std::size_t voted_ = 0;
+  std::vector<Hypothesis> found_;
+  std::uint64_t votes_cast_ = 0;
+};
+
+/// Where the part may stand in a scan, with all of the options' reference points at once.
 /// Sorted by decreasing votes; empty when nothing was voted for. Same bytes for any number of threads.
 /// Errors: invalid_argument for options; cancelled.
 [[nodiscard]] Result<std::vector<Hypothesis>> find_hypotheses(const scan::Scan& scan, const Codebook& codebook,

@@ -16,6 +16,8 @@ Result<void> DetectOptions::validate() const {
   ASBUILT_CHECK(expect_between("cluster_angle_deg", cluster_angle_deg, 0.0, 180.0));
   ASBUILT_CHECK(expect_between("cluster_distance_ratio", cluster_distance_ratio, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("alpha_bins", alpha_bins, 6, 180));
+  ASBUILT_CHECK(expect_between("first_reference_points", first_reference_points, 0, 1000000));
+  ASBUILT_CHECK(expect_between("first_hypotheses", first_hypotheses, 1, 100000));
   ASBUILT_CHECK(expect_between("reference_points", reference_points, 1, 1000000));
   ASBUILT_CHECK(expect_between("max_hypotheses", max_hypotheses, 1, 100000));
   ASBUILT_CHECK(expect_between("peaks_per_reference", peaks_per_reference, 1, 100));

@@ -13,6 +13,8 @@ struct DetectOptions {
   double bucket_weight_exponent = 0.3;   ///< e of a vote's weight N_b^-e; paper: 1, which lets rare features rule
   double bucket_cap = 4.0;               ///< buckets with more than this many entries per model sample do not vote
   int alpha_bins = 30;                   ///< bins over (-pi, pi] for the rotation about the normal
+  int first_reference_points = 400;      ///< scene reference points of a first look; 0: none is taken
+  int first_hypotheses = 60;             ///< clusters of the first look that are verified
   int reference_points = 1000;           ///< scene reference points; paper: 400-1000
   int max_hypotheses = 200;              ///< clusters handed to verification; paper: some 50
   double cluster_angle_deg = 15.0;       ///< poses closer than this in rotation ...
@@ -30,6 +32,7 @@ struct DetectOptions {
     published.bucket_weight_exponent = 1.0;
     published.border_reach = 0.5;
     published.peaks_per_reference = 1;
+    published.first_reference_points = 0;
     published.max_hypotheses = 50;
     return published;
   }
@@ -44,6 +47,9 @@ void for_each_field(DetectOptions& options, Visitor&& field) {
   field("bucket_weight_exponent", options.bucket_weight_exponent, "e of a vote's weight N_b^-e (paper: 1)");
   field("bucket_cap", options.bucket_cap, "buckets with more entries per model sample do not vote");
   field("alpha_bins", options.alpha_bins, "bins for the rotation about the reference normal");
+  field("first_reference_points", options.first_reference_points,
+        "scene reference points of a first look, which is enough where the part is beyond doubt (0: none)");
+  field("first_hypotheses", options.first_hypotheses, "pose clusters of the first look that are verified");
   field("reference_points", options.reference_points, "scene reference points");
   field("max_hypotheses", options.max_hypotheses, "pose clusters handed to verification");
   field("cluster_angle_deg", options.cluster_angle_deg, "rotation within which hypotheses are one pose");

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::detect {
@@ -38,6 +39,29 @@ class Closeness {
   double squared_distance_, half_cosine_;
 };
 
+// Of every placement those close to it, itself among them, by increasing index.
+std::vector<std::vector<std::uint32_t>> close_placements(const std::vector<Placement>& placements,
+                                                         const ClusterOptions& options, const Context& context) {
+  std::vector<Eigen::Vector3f> centres;  // from the first one, which keeps them exact enough for the search
+  for (const Placement& placement : placements) {
+    centres.push_back((placement.centre_in_scan - placements.front().centre_in_scan).cast<float>());
+  }
+  const KdTree tree(centres);
+  const Closeness are_close(options);
+  constexpr double kRounding = 1.001;
+  std::vector<std::vector<std::uint32_t>> close(placements.size());
+  parallel_for_blocks(context, placements.size(), 64, [&](std::size_t begin, std::size_t end) {
+    std::vector<KdTree::Neighbour> near;
+    for (std::size_t i = begin; i < end; ++i) {
+      tree.within(centres[i], static_cast<float>(kRounding * options.distance_mm), near);
+      for (const KdTree::Neighbour& other : near) {
+        if (are_close(placements[i], placements[other.index])) close[i].push_back(other.index);
+      }
+    }
+  });
+  return close;
+}
+
 Pose mean_of(std::span<const Placement> members, const Eigen::Vector3d& centre_in_model) {
   Eigen::Vector4d rotation = Eigen::Vector4d::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -66,15 +90,13 @@ std::vector<Hypothesis> cluster_poses(std::span<const Hypothesis> poses, const E
                                       const ClusterOptions& options, const Context& context) {
   std::vector<Placement> placements;
   for (const Hypothesis& pose : poses) placements.push_back(placement(pose, centre_in_model));
-  const Closeness are_close(options);
+  const std::vector<std::vector<std::uint32_t>> close = close_placements(placements, options, context);
 
   // Support of a pose: the votes of all within reach, so that the order of the poses does not shape the clusters.
   std::vector<double> support(placements.size());
-  parallel_for(context, placements.size(), 32, [&](std::size_t i) {
-    double sum = 0.0;
-    for (const Placement& other : placements) sum += are_close(placements[i], other) ? other.votes : 0.0;
-    support[i] = sum;
-  });
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    for (const std::uint32_t j : close[i]) support[i] += placements[j].votes;
+  }
   std::vector<std::uint32_t> order(placements.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
@@ -89,8 +111,8 @@ std::vector<Hypothesis> cluster_poses(std::span<const Hypothesis> poses, const E
     if (is_taken[seed] != 0) continue;
     members.assign(1, placements[seed]);
     is_taken[seed] = 1;
-    for (std::size_t i = 0; i < placements.size(); ++i) {
-      if (is_taken[i] != 0 || !are_close(placements[seed], placements[i])) continue;
+    for (const std::uint32_t i : close[seed]) {
+      if (is_taken[i] != 0) continue;
       is_taken[i] = 1;
       members.push_back(placements[i]);
     }

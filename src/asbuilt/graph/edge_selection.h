@@ -17,8 +17,8 @@ struct PairOverlap {
 };
 
 struct EdgeSelectionOptions {
-  double low = 0.10;         ///< alpha_l: a pair below it is never linked (our value; the paper gives none)
-  double high = 0.20;  ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
+  double low = 0.05;         ///< alpha_l: a pair below it is never linked (our value; the paper gives none)
+  double high = 0.10;        ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
   int max_degree = 0;        ///< strong links a scan keeps in dense networks, highest overlap first; 0: all of them
   bool bridges_only = true;  ///< below `high` only a pair that joins two components; paper: any, until connected
 

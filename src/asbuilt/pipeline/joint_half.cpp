@@ -25,34 +25,76 @@ void drop(std::vector<PosedScan>& scans, const Contradiction& contradiction, io:
   io::ScanRecord& scan = record.scans[static_cast<std::size_t>(position->index)];
   scan.status = io::ScanStatus::dropped;
   scan.reason_code = "contradicted_by_scans";
-  scan.reason = fmt::format(
-      "under its pose it differs from the scans it overlaps by {:.3g} mm, they from one another by "
-      "{:.3g} mm",
-      contradiction.spread_mm, contradiction.others_spread_mm);
+  scan.reason = contradiction.reason;
   scan.model_from_scan.reset();
   context.warn(fmt::format("{}: dropped: {}", scan.path, scan.reason));
   scans.erase(position);
 }
 
-/// Links and refines; drops one contradicted scan at a time and begins again without it.
+bool same_links(const graph::PoseGraph& a, const graph::PoseGraph& b) {
+  const auto pairs = [](const graph::PoseGraph& graph) {
+    std::vector<std::pair<int, int>> all;
+    for (const graph::PairOverlap& edge : graph.edges) all.emplace_back(edge.first, edge.second);
+    std::ranges::sort(all);
+    return all;
+  };
+  return pairs(a) == pairs(b);
+}
+
+Result<graph::PoseGraph> linked(const std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
+                                RunFolder& folder, const Context& context) {
+  const auto timed = folder.stage("graph");
+  return link(scans, model, options, context);
+}
+
+/// Refines all components; names the first contradiction.
+Result<std::optional<Contradiction>> refine_all(Registration& registration, std::vector<PosedScan>& scans,
+                                                const LoadedModel& model, const Options& options, RunFolder& folder,
+                                                const Context& context) {
+  const auto timed = folder.stage("refine");
+  std::optional<Contradiction> contradiction;
+  registration.components.clear();
+  for (const std::vector<int>& members : registration.graph.components) {
+    ASBUILT_TRY(component, refine_component(members, registration.graph, scans, model, options, context));
+    if (!options.paper_mode && !contradiction) {
+      ASBUILT_TRY(found, contradiction_in(component, scans, context));
+      contradiction = std::move(found);
+    }
+    registration.components.push_back(std::move(component));
+  }
+  return contradiction;
+}
+
+/// Links and refines; drops one contradicted scan at a time and begins again without it. Overlaps under detected poses
+/// are rough, and so are segments that were cut out under them: when all agree, points that other scans looked through
+/// go, the graph is made anew under the refined poses, and refinement goes on from there.
 Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
                                 RunFolder& folder, io::RunRecord& record, const Context& context) {
-  while (true) {
-    Registration registration;
-    {
-      const auto timed = folder.stage("graph");
-      ASBUILT_TRY(graph, link(scans, model, options, context));
+  constexpr int kMostRounds = 3;
+  Registration registration;
+  ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
+  registration.graph = std::move(first_graph);
+  for (int round = 1;; ++round) {
+    ASBUILT_TRY(contradiction, refine_all(registration, scans, model, options, folder, context));
+    // Rough starts leave a graph with gaps, in which a scan may have gone astray that a better one brings back.
+    if (contradiction && round > 1) {
+      drop(scans, *contradiction, record, context);
+      for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
+      ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
       registration.graph = std::move(graph);
+      round = 0;
+      continue;
     }
-    const auto timed = folder.stage("refine");
-    std::optional<Contradiction> contradiction;
-    for (const std::vector<int>& members : registration.graph.components) {
-      ASBUILT_TRY(component, refine_component(members, registration.graph, scans, model, options, context));
-      if (!options.paper_mode && !contradiction) contradiction = contradiction_in(component, scans);
-      registration.components.push_back(std::move(component));
+    if (options.paper_mode || round == kMostRounds) return registration;
+    if (round == 1 && !contradiction) {
+      for (const RefinedComponent& component : registration.components) {
+        ASBUILT_CHECK(remove_seen_through(component, scans, context));
+      }
     }
-    if (!contradiction) return registration;
-    drop(scans, *contradiction, record, context);
+    for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local;
+    ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
+    if (round > 1 && same_links(graph, registration.graph)) return registration;
+    registration.graph = std::move(graph);
   }
 }
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "asbuilt/detect/detect.h"
+#include "asbuilt/pipeline/find_part.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/verify/instances.h"
 #include "asbuilt/verify/verify.h"
@@ -103,17 +103,14 @@ void describe_detection(io::ScanRecord& record, const verify::Detection& detecti
   record.segment_points = detection.segment.size();
 }
 
-/// Starts that the user gave for this scan come first, with the votes of the best.
-std::vector<detect::Hypothesis> with_starts(std::vector<detect::Hypothesis> hypotheses, const io::ScanFile& file,
-                                            const std::vector<io::NamedPose>& starts) {
-  const double votes = hypotheses.empty() ? 1.0 : hypotheses.front().votes;
-  std::vector<detect::Hypothesis> all;
+/// The starts that the user gave for this scan.
+std::vector<Pose> starts_for(const io::ScanFile& file, const std::vector<io::NamedPose>& starts) {
+  std::vector<Pose> own;
   for (const io::NamedPose& start : starts) {
     if (!names_scan(start.scan, file.path.string(), file.name)) continue;
-    all.push_back({for_local(start.model_from_scan, file.offset_mm), votes});
+    own.push_back(for_local(start.model_from_scan, file.offset_mm));
   }
-  all.insert(all.end(), hypotheses.begin(), hypotheses.end());
-  return all;
+  return own;
 }
 
 /// The candidate that --accept names for a placement of this scan. The scan's name stands for the first placement.
@@ -155,19 +152,6 @@ Result<verify::Detection> accept_for_user(const verify::Detection& detection, in
   return std::move(accepted);
 }
 
-/// The one placement, or all of them, as the user wants.
-Result<std::vector<verify::Detection>> placements_in(const scan::Scan& scan,
-                                                     const std::vector<detect::Hypothesis>& hypotheses,
-                                                     const ScanHalf& half, const detect::SampledScan& sampled,
-                                                     const Context& context) {
-  const model::PreparedModel& model = half.model.prepared;
-  if (half.options.instances == Instances::all) {
-    return verify::verify_instances(scan, model, hypotheses, half.options.verify, context, &sampled);
-  }
-  ASBUILT_TRY(detection, verify::verify(scan, model, hypotheses, half.options.verify, context, false, {}, &sampled));
-  return std::vector<verify::Detection>{std::move(detection)};
-}
-
 }  // namespace
 
 Options with_units_read(const ScanHalf& half, const io::ScanFile& file) {
@@ -194,19 +178,13 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     return std::vector<JudgedScan>{std::move(judged)};
   }
 
-  const model::PreparedModel& model = half.model.prepared;
-  detect::SampledScan sampled;
-  Result<std::vector<detect::Hypothesis>> hypotheses;
-  {
-    const auto timed = folder.stage("detect", file.name);
-    sampled = detect::sampled_scan(*scan, model.sampling_distance, model.diameter, context);
-    hypotheses = detect::find_hypotheses(*scan, sampled, half.codebook, half.options.detect, context);
-  }
-  if (!hypotheses) return tl::unexpected(hypotheses.error());
-
-  const auto timed = folder.stage("verify", file.name);
-  const auto starts = with_starts(std::move(*hypotheses), file, half.starts);
-  ASBUILT_TRY(placements, placements_in(*scan, starts, half, sampled, context));
+  const TimedStage timed = [&](std::string_view stage, const std::function<void()>& work) {
+    const auto taken = folder.stage(stage, file.name);
+    work();
+  };
+  ASBUILT_TRY(found, find_part(*scan, half.model.prepared, half.codebook, starts_for(file, half.starts), half.options,
+                               timed, context));
+  std::vector<verify::Detection>& placements = found.placements;
   ASBUILT_CHECK(check_acceptances(file, placements.size(), half.options));
   bool chosen_by_user = false;
   for (std::size_t i = 0; i < placements.size(); ++i) {

@@ -113,7 +113,7 @@ Options with_paper_mode_applied(const Options& options) {
   applied.detect = options.detect.as_published();
   applied.verify = options.verify.as_published();
   applied.graph.paper_mode = true;
-  applied.refine.paper_mode = true;
+  applied.refine = options.refine.as_published();
   applied.fuse.paper_mode = true;
   applied.gauge = Gauge::fixed;
   return applied;

@@ -7,6 +7,7 @@
 
 #include "asbuilt/pipeline/segment_file.h"
 #include "asbuilt/refine/gauge.h"
+#include "asbuilt/refine/link_evidence.h"
 #include "asbuilt/refine/suspicious_view.h"
 
 namespace asbuilt::pipeline {
@@ -16,7 +17,7 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
   std::vector<refine::View> views;
   for (const int member : members) {
     const PosedScan& scan = scans[static_cast<std::size_t>(member)];
-    views.push_back({scan.part, scan.model_from_local_detected, scan.noise_sigma_mm});
+    views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
   }
   return views;
 }
@@ -55,6 +56,15 @@ Result<refine::Refinement> refined(const std::vector<refine::View>& views, const
   return alone;
 }
 
+scan::Viewpoint local_viewpoint(const io::ScanRecord& scan) {
+  scan::Viewpoint viewpoint;
+  if (!scan.viewpoint) return viewpoint;
+  const bool is_point = scan.viewpoint_kind == "point";
+  viewpoint.kind = is_point ? scan::Viewpoint::Kind::point : scan::Viewpoint::Kind::direction;
+  viewpoint.value = is_point ? Eigen::Vector3d(*scan.viewpoint - scan.offset) : *scan.viewpoint;
+  return viewpoint;
+}
+
 }  // namespace
 
 Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, const RunFolder& folder) {
@@ -67,8 +77,10 @@ Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, con
     posed.index = static_cast<int>(i);
     posed.part = std::move(part);
     posed.model_from_local_detected = *scan.model_from_scan * Eigen::Translation3d(scan.offset);
+    posed.model_from_local_start = posed.model_from_local_detected;
     posed.noise_sigma_mm = scan.noise_sigma;
     posed.spacing_mm = scan.spacing;
+    posed.viewpoint = local_viewpoint(scan);
     scans.push_back(std::move(posed));
   }
   return scans;
@@ -77,7 +89,7 @@ Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, con
 Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
                               const Context& context) {
   std::vector<graph::PosedSegment> segments;
-  for (const PosedScan& scan : scans) segments.push_back({scan.part, scan.model_from_local_detected});
+  for (const PosedScan& scan : scans) segments.push_back({scan.part, scan.model_from_local_start});
   return graph::build_graph(segments, model.prepared, options.graph, context);
 }
 
@@ -85,8 +97,8 @@ Result<RefinedComponent> refine_component(const std::vector<int>& members, const
                                           std::vector<PosedScan>& scans, const LoadedModel& model,
                                           const Options& options, const Context& context) {
   const std::vector<refine::View> views = views_of(members, scans);
-  RefinedComponent component{members, {}, Pose::Identity()};
-  ASBUILT_TRY(refinement, refined(views, links_among(members, graph), options, context));
+  RefinedComponent component{members, links_among(members, graph), {}, Pose::Identity()};
+  ASBUILT_TRY(refinement, refined(views, component.links, options, context));
   component.refinement = std::move(refinement);
   if (options.gauge == Gauge::best_fit) {
     ASBUILT_TRY(gauge, refine::best_fit_gauge(views, component.refinement.model_from_scan, *model.prepared.surface,
@@ -102,18 +114,48 @@ Result<RefinedComponent> refine_component(const std::vector<int>& members, const
   return component;
 }
 
-std::optional<Contradiction> contradiction_in(const RefinedComponent& component, const std::vector<PosedScan>& scans) {
+Result<void> remove_seen_through(const RefinedComponent& component, std::vector<PosedScan>& scans,
+                                 const Context& context) {
+  const std::vector<refine::View> views = views_of(component.members, scans);
+  ASBUILT_TRY(marked, refine::seen_through(views, component.refinement.model_from_scan, component.links, context));
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    PointCloud& part = scans[static_cast<std::size_t>(component.members[v])].part;
+    PointCloud kept;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      if (marked[v][i] != 0) continue;
+      kept.positions.push_back(part.positions[i]);
+      kept.normals.push_back(part.normals[i]);
+    }
+    if (!kept.empty()) part = std::move(kept);
+  }
+  return {};
+}
+
+Result<std::optional<Contradiction>> contradiction_in(const RefinedComponent& component,
+                                                      const std::vector<PosedScan>& scans, const Context& context) {
+  const auto count = static_cast<int>(component.members.size());
+  const auto member = [&](int view) { return component.members[static_cast<std::size_t>(view)]; };
+  const std::vector<refine::View> views = views_of(component.members, scans);
+  ASBUILT_TRY(evidence, refine::link_evidence(views, component.refinement.model_from_scan, component.links, context));
+  if (const auto contradicted = refine::contradicted_view(count, evidence)) {
+    return Contradiction{
+        member(contradicted->view),
+        fmt::format("where its pose puts it, {:.1f} % of what it shares with the scans it overlaps was "
+                    "seen through; among those it is {:.1f} %",
+                    100.0 * contradicted->share, 100.0 * contradicted->usual_share)};
+  }
   // Two scans of one part never agree better than noise and spacing let them.
   double floor_mm = 0.0;
-  for (const int member : component.members) {
-    const PosedScan& scan = scans[static_cast<std::size_t>(member)];
+  for (const int each : component.members) {
+    const PosedScan& scan = scans[static_cast<std::size_t>(each)];
     floor_mm = std::max(floor_mm, std::max(scan.noise_sigma_mm, 0.1 * scan.spacing_mm));
   }
-  const auto suspicious =
-      refine::suspicious_view(static_cast<int>(component.members.size()), component.refinement.edges, floor_mm);
-  if (!suspicious) return std::nullopt;
-  return Contradiction{component.members[static_cast<std::size_t>(suspicious->view)], suspicious->spread_mm,
-                       suspicious->others_spread_mm};
+  const auto suspicious = refine::suspicious_view(count, component.refinement.edges, floor_mm);
+  if (!suspicious) return std::optional<Contradiction>();
+  return Contradiction{member(suspicious->view),
+                       fmt::format("under its pose it differs from the scans it overlaps by {:.3g} mm, they from one "
+                                   "another by {:.3g} mm",
+                                   suspicious->spread_mm, suspicious->others_spread_mm)};
 }
 
 }  // namespace asbuilt::pipeline

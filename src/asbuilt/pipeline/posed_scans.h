@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "asbuilt/core/context.h"
@@ -13,6 +15,7 @@
 #include "asbuilt/pipeline/options.h"
 #include "asbuilt/pipeline/run_folder.h"
 #include "asbuilt/refine/refine.h"
+#include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::pipeline {
 
@@ -21,14 +24,17 @@ struct PosedScan {
   int index = 0;                                      ///< in the record
   PointCloud part;                                    ///< in the scan frame minus the offset
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
+  Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
   Matrix6d covariance = Matrix6d::Zero();
   double noise_sigma_mm = 0.0, spacing_mm = 0.0;
+  scan::Viewpoint viewpoint;  ///< for the coordinates of `part`
 };
 
 /// One component of the graph after its refinement.
 struct RefinedComponent {
-  std::vector<int> members;  ///< indices into the posed scans
+  std::vector<int> members;         ///< indices into the posed scans
+  std::vector<refine::Link> links;  ///< among the members, by their place in `members`
   refine::Refinement refinement;
   Pose model_from_refined = Pose::Identity();  ///< the gauge, already applied to the posed scans
 };
@@ -36,7 +42,7 @@ struct RefinedComponent {
 /// A posed scan that the others contradict.
 struct Contradiction {
   int member = 0;  ///< index into the posed scans
-  double spread_mm = 0.0, others_spread_mm = 0.0;
+  std::string reason;
 };
 
 /// The parts of all accepted scans, read from the folder's segments.
@@ -45,14 +51,21 @@ struct Contradiction {
 [[nodiscard]] Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedModel& model,
                                             const Options& options, const Context& context);
 
-/// Refines the members jointly, from their detected poses, and brings them into the model frame. A lone scan keeps its
+/// Refines the members jointly, from where they start, and brings them into the model frame. A lone scan keeps its
 /// pose up to the gauge. The posed scans get their refined poses.
 [[nodiscard]] Result<RefinedComponent> refine_component(const std::vector<int>& members, const graph::PoseGraph& graph,
                                                         std::vector<PosedScan>& scans, const LoadedModel& model,
                                                         const Options& options, const Context& context);
 
-/// The scan, if there is one, that the others of its component contradict.
-[[nodiscard]] std::optional<Contradiction> contradiction_in(const RefinedComponent& component,
-                                                            const std::vector<PosedScan>& scans);
+/// Takes points out of the members' parts that other scans looked straight through under the refined poses and none
+/// measured: clutter that was cut out with the part, flying points.
+[[nodiscard]] Result<void> remove_seen_through(const RefinedComponent& component, std::vector<PosedScan>& scans,
+                                               const Context& context);
+
+/// The scan, if there is one, that the others of its component contradict: they saw through its points, or it through
+/// theirs, or its residuals are much wider than theirs.
+[[nodiscard]] Result<std::optional<Contradiction>> contradiction_in(const RefinedComponent& component,
+                                                                    const std::vector<PosedScan>& scans,
+                                                                    const Context& context);
 
 }  // namespace asbuilt::pipeline

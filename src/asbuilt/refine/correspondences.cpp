@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "asbuilt/core/parallel.h"
 
@@ -11,33 +12,63 @@ namespace {
 
 constexpr std::size_t kBlock = 1024;
 
+double squared(double x) { return x * x; }
+
 const SampledView& view_at(std::span<const SampledView> views, int index) {
   return views[static_cast<std::size_t>(index)];
 }
 
 std::size_t searchers(const SampledView& view, bool coarse) { return coarse ? view.coarse.size() : view.points.size(); }
 
-// Doubtful points count so little that they decide nothing where there are others, but not nothing: where two scans
-// share only their rims and edges, these still hold them together.
-float weight_of(const SampledView& view, std::uint32_t point) {
-  constexpr float kOnBorder = 0.003F, kDoubtful = 0.01F;
-  return view.is_border[point] != 0 ? kOnBorder : view.is_doubtful[point] != 0 ? kDoubtful : 1.0F;
+Pose target_from_source(const DirectedEdge& edge, std::span<const Pose> poses) {
+  return poses[static_cast<std::size_t>(edge.target)].inverse(Eigen::Isometry) *
+         poses[static_cast<std::size_t>(edge.source)];
 }
 
-std::uint32_t match_of(std::uint32_t source, const SampledView& from, const SampledView& to, const Pose& to_from_from,
-                       double reach, const MatchRules& rules) {
+// Root mean squared motion (an upper bound) of the source's points since the last search.
+double moved_since(const DirectedEdge& edge, const Pose& now, const SampledView& from) {
+  const Eigen::Vector3d shift = now * from.centroid - edge.target_from_source * from.centroid;
+  const double turn = (now.linear() - edge.target_from_source.linear()).norm() / std::numbers::sqrt2;
+  return std::hypot(shift.norm(), turn * from.radius_mm);
+}
+
+bool may_keep(const DirectedEdge& edge, const Pose& now, std::span<const SampledView> views, const MatchRules& rules) {
+  // A reach that has shrunk leaves matches that the robust loss has done with already.
+  return edge.searched && edge.searched_coarse == rules.coarse && edge.searched_reach_mm <= 2.0 * edge.reach_mm &&
+         moved_since(edge, now, view_at(views, edge.source)) <=
+             rules.keep_spacings * view_at(views, edge.target).spacing_mm;
+}
+
+// `before` is what the last search found, or kNone: the nearest point is no further than that one is now.
+std::uint32_t match_of(std::uint32_t source, std::uint32_t before, const SampledView& from, const SampledView& to,
+                       const Pose& to_from_from, double reach, const MatchRules& rules) {
   const Eigen::Vector3f query = (to_from_from * from.points.positions[source].cast<double>()).cast<float>();
-  const auto reach_float = static_cast<float>(reach);
-  KdTree::Neighbour found;
-  if (rules.check_normals) {
-    const Eigen::Vector3f normal = (to_from_from.linear() * from.points.normals[source].cast<double>()).cast<float>();
-    found =
-        to.tree->nearest_facing(query, reach_float, to.points.normals, normal, static_cast<float>(rules.min_cosine));
-  } else {
-    found = to.tree->nearest(query, reach_float);
+  auto reach_float = static_cast<float>(reach);
+  constexpr float kRounding = 1.0001F;  // the bound itself is still found
+  const auto bound = [&] { return kRounding * (to.points.positions[before] - query).norm() + 1e-6F * reach_float; };
+  if (!rules.check_normals) {
+    if (before != KdTree::kNone) reach_float = std::min(reach_float, bound());
+    return to.tree->nearest(query, reach_float).index;
   }
-  if (!found.found()) return KdTree::kNone;
-  return found.index;
+  const Eigen::Vector3f normal = (to_from_from.linear() * from.points.normals[source].cast<double>()).cast<float>();
+  const auto min_cosine = static_cast<float>(rules.min_cosine);
+  if (before != KdTree::kNone && to.points.normals[before].dot(normal) > min_cosine) {
+    reach_float = std::min(reach_float, bound());
+  }
+  return to.tree->nearest_facing(query, reach_float, to.points.normals, normal, min_cosine).index;
+}
+
+float weight_of(std::uint32_t source, std::uint32_t target, const SampledView& from, const SampledView& to,
+                const Pose& to_from_from, const MatchRules& rules) {
+  const float variance = 0.5F * (from.variance[source] + to.variance[target]);
+  float weight = std::min(from.weight[source], to.weight[target]) / variance;
+  if (!rules.weigh_reach || !(to.fit_radius_mm > 0.0)) return weight;
+  const Eigen::Vector3f offset =
+      (to_from_from * from.points.positions[source].cast<double>() - to.points.positions[target].cast<double>())
+          .cast<float>();
+  const float height = offset.dot(to.points.normals[target]);
+  const float along = (offset.squaredNorm() - height * height) / static_cast<float>(squared(to.fit_radius_mm));
+  return weight / (1.0F + along * along);
 }
 
 struct Task {
@@ -46,41 +77,56 @@ struct Task {
 
 }  // namespace
 
-void find_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views, std::span<const Pose> poses,
-                  const MatchRules& rules, const Context& context) {
-  std::vector<std::vector<std::uint32_t>> target(edges.size());
-  std::vector<Task> tasks;
+std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views,
+                         std::span<const Pose> poses, const MatchRules& rules, const Context& context) {
+  std::vector<std::size_t> due;
   for (std::size_t e = 0; e < edges.size(); ++e) {
+    const Pose now = target_from_source(edges[e], poses);
+    if (may_keep(edges[e], now, views, rules)) continue;
+    edges[e].target_from_source = now;
+    edges[e].searched_reach_mm = edges[e].reach_mm;
+    edges[e].searched_coarse = rules.coarse;
+    edges[e].searched = true;
+    due.push_back(e);
+  }
+  std::vector<std::vector<Match>> found(edges.size());
+  std::vector<Task> tasks;
+  for (const std::size_t e : due) {
     const std::size_t count = searchers(view_at(views, edges[e].source), rules.coarse);
-    target[e].assign(count, KdTree::kNone);
+    found[e].resize(count);
+    const SampledView& from = view_at(views, edges[e].source);
+    auto earlier = edges[e].matches.begin();  // by increasing source, as what follows
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t source = rules.coarse ? from.coarse[i] : static_cast<std::uint32_t>(i);
+      while (earlier != edges[e].matches.end() && earlier->source < source) ++earlier;
+      const bool known = earlier != edges[e].matches.end() && earlier->source == source;
+      found[e][i] = {source, known ? earlier->target : KdTree::kNone, 0.0F};
+    }
     for (std::size_t i = 0; i < count; i += kBlock) tasks.push_back({e, i, std::min(count, i + kBlock)});
   }
-  const auto source_of = [&](const SampledView& view, std::size_t i) {
-    return rules.coarse ? view.coarse[i] : static_cast<std::uint32_t>(i);
-  };
   parallel_for(context, tasks.size(), 1, [&](std::size_t t) {
     if (context.cancelled()) return;
     const Task& task = tasks[t];
     const DirectedEdge& edge = edges[task.edge];
     const SampledView& from = view_at(views, edge.source);
     const SampledView& to = view_at(views, edge.target);
-    const Pose to_from_from = poses[static_cast<std::size_t>(edge.target)].inverse(Eigen::Isometry) *
-                              poses[static_cast<std::size_t>(edge.source)];
     for (std::size_t i = task.begin; i < task.end; ++i) {
-      target[task.edge][i] = match_of(source_of(from, i), from, to, to_from_from, edge.reach_mm, rules);
+      const auto [source, before, nothing] = found[task.edge][i];
+      const std::uint32_t target = match_of(source, before, from, to, edge.target_from_source, edge.reach_mm, rules);
+      const bool matched = target != KdTree::kNone;
+      found[task.edge][i] = {source, target,
+                             matched ? weight_of(source, target, from, to, edge.target_from_source, rules) : 0.0F};
     }
   });
-  parallel_for(context, edges.size(), 1, [&](std::size_t e) {
-    const SampledView& from = view_at(views, edges[e].source);
-    const SampledView& to = view_at(views, edges[e].target);
-    edges[e].matches.clear();
-    for (std::size_t i = 0; i < target[e].size(); ++i) {
-      if (target[e][i] == KdTree::kNone) continue;
-      const std::uint32_t source = source_of(from, i);
-      const float weight = std::min(weight_of(from, source), weight_of(to, target[e][i]));
-      edges[e].matches.push_back({source, target[e][i], weight});
+  parallel_for(context, due.size(), 1, [&](std::size_t d) {
+    std::vector<Match>& matches = edges[due[d]].matches;
+    matches.clear();
+    for (const Match& match : found[due[d]]) {
+      // Also where the search was cut short: nothing there has a weight.
+      if (match.weight > 0.0F && match.target != KdTree::kNone) matches.push_back(match);
     }
   });
+  return due.size();
 }
 
 ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const SampledView> views,
@@ -88,10 +134,13 @@ ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const
   if (edge.matches.empty()) return {};
   const SampledView& from = view_at(views, edge.source);
   const SampledView& to = view_at(views, edge.target);
-  const Pose to_from_from = poses[static_cast<std::size_t>(edge.target)].inverse(Eigen::Isometry) *
-                            poses[static_cast<std::size_t>(edge.source)];
+  const Pose to_from_from = target_from_source(edge, poses);
   std::vector<double> residuals, sines;
-  for (const Match& match : edge.matches) {
+  // Medians of a few thousand are as good as those of all.
+  constexpr std::size_t kEnough = 4000;
+  const std::size_t stride = (edge.matches.size() + kEnough - 1) / kEnough;
+  for (std::size_t m = 0; m < edge.matches.size(); m += stride) {
+    const Match& match = edge.matches[m];
     const Eigen::Vector3d p = to_from_from * from.points.positions[match.source].cast<double>();
     const Eigen::Vector3d normal_p = to_from_from.linear() * from.points.normals[match.source].cast<double>();
     const Eigen::Vector3d normal_q = to.points.normals[match.target].cast<double>();

@@ -26,7 +26,9 @@ constexpr double kReachInSpacings = 2.5;  // ... or spacings of the target
 constexpr double kMaxScaleRatio = 3.0;    // one bad edge may not widen its own loss beyond this share of the others'
 constexpr double kMinWeight = 1e-3;       // of an edge whose residuals are wide, relative to a usual one
 constexpr double kCoarseMotion = 0.5;     // in units of noise: near enough for the full sample
+constexpr double kHeldInSpreads = 1.0;    // squared spreads of the normals that an edge must hold more than
 constexpr double kMinHeld = 1e-7, kMaxHeld = 5e-3;  // bounds of the rank threshold of an edge
+constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
 double squared(double x) { return x * x; }
 
@@ -114,11 +116,12 @@ class JointRefinement {
   enum class Outcome { improved, settled };
 
   void sample(std::span<const View> views) {
-    const auto points = static_cast<std::size_t>(options_.points_per_scan);
-    for (const View& view : views) {
-      views_.push_back(sampled_view(view.segment_in_scan, view.noise_sigma_mm, points, kCoarsePoints,
-                                    !options_.paper_mode, context_));
-    }
+    const SamplingRules rules{static_cast<std::size_t>(options_.points_per_scan), kCoarsePoints, options_.face_normals,
+                              options_.rim_weights, options_.incidence_weights};
+    views_.resize(views.size());
+    parallel_for(context_, views.size(), 1, [&](std::size_t v) {
+      views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, views[v].viewpoint, rules, context_);
+    });
   }
 
   // Origin and length that make rotations and translations comparable, and the diameter of all views together.
@@ -168,12 +171,16 @@ class JointRefinement {
 
   [[nodiscard]] MatchRules rules(bool coarse) const {
     const double degrees = std::numbers::pi / 180.0;
-    return {coarse, !options_.paper_mode, std::cos(options_.max_normal_angle_deg * degrees)};
+    return {coarse, !options_.paper_mode, std::cos(options_.max_normal_angle_deg * degrees), options_.reach_weights,
+            0.0};
   }
 
-  void match_and_scale(bool coarse, bool first) {
-    find_matches(edges_, views_, poses_, rules(coarse), context_);
-    if (options_.paper_mode && !first) return;  // the published loss has one fixed scale
+  // Gives the number of edges whose matches are new.
+  std::size_t match_and_scale(bool coarse, bool first, bool afresh) {
+    MatchRules matching = rules(coarse);
+    if (options_.keep_matches && !afresh) matching.keep_spacings = kKeepSpacings;
+    const std::size_t searched = find_matches(edges_, views_, poses_, matching, context_);
+    if (!options_.anneal && !first) return searched;  // the published loss has one fixed scale
     std::vector<ResidualStatistics> statistics(edges_.size());
     parallel_for(context_, edges_.size(), 1,
                  [&](std::size_t e) { statistics[e] = residual_statistics(edges_[e], views_, poses_); });
@@ -184,18 +191,19 @@ class JointRefinement {
     usual_scale_ = median_of(scales);
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       const double own = std::max(statistics[e].scale_mm, scale_floor(edges_[e]));
-      const double scale = options_.paper_mode ? usual_scale_ : std::min(own, kMaxScaleRatio * usual_scale_);
+      const double scale = options_.anneal ? std::min(own, kMaxScaleRatio * usual_scale_) : usual_scale_;
       edges_[e].scale_mm = kTukeyTuning * scale;
       edges_[e].normal_spread = statistics[e].normal_spread;
       // Each edge counts by its own variance: precise scanners lead, and a view that stands wrong cannot bend the rest.
       const double ratio = squared(usual_scale_ / own);
-      edges_[e].weight = options_.paper_mode ? 1.0 : std::clamp(ratio, kMinWeight, 1.0 / kMinWeight);
+      edges_[e].weight = options_.edge_weights ? std::clamp(ratio, kMinWeight, 1.0 / kMinWeight) : 1.0;
     }
+    return searched;
   }
 
   // From the misalignment to the noise: the reach follows the residuals down, edge by edge.
   void shrink_reach() {
-    if (options_.paper_mode) return;
+    if (!options_.anneal) return;
     for (DirectedEdge& edge : edges_) {
       const double wanted =
           std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
@@ -204,11 +212,11 @@ class JointRefinement {
   }
 
   [[nodiscard]] bool reach_is_settled() const {
-    return options_.paper_mode || std::ranges::all_of(edges_, [&](const DirectedEdge& edge) {
-             const double wanted =
-                 std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
-             return edge.reach_mm <= 1.2 * wanted;
-           });
+    return !options_.anneal || std::ranges::all_of(edges_, [&](const DirectedEdge& edge) {
+      const double wanted =
+          std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
+      return edge.reach_mm <= 1.2 * wanted;
+    });
   }
 
   // Variance of a residual of weight one: the weights of the edges are in the normal matrix and so do not belong here.
@@ -240,8 +248,8 @@ class JointRefinement {
       const LinkBlock block{links_[l].first, links_[l].second, both.information, there.gradient - back.gradient,
                             both.weight};
       const double spread = std::max(edges_[2 * l].normal_spread, edges_[2 * l + 1].normal_spread);
-      const double threshold = std::clamp(2.0 * squared(spread), kMinHeld, kMaxHeld);
-      blocks.push_back(options_.paper_mode ? block : held_part(block, both, scaling_, threshold));
+      const double threshold = std::clamp(kHeldInSpreads * squared(spread), kMinHeld, kMaxHeld);
+      blocks.push_back(options_.drop_unheld ? held_part(block, both, scaling_, threshold) : block);
     }
     return {static_cast<int>(views_.size()), fixed_, blocks};
   }
@@ -293,13 +301,13 @@ class JointRefinement {
   }
 
   Result<void> descend(Refinement& result) {
-    const bool has_coarse = !options_.paper_mode && std::ranges::any_of(views_, [](const SampledView& view) {
-      return view.points.size() > 2 * view.coarse.size();
-    });
+    const bool has_coarse = options_.coarse_to_fine && std::ranges::any_of(views_, [](const SampledView& view) {
+                              return view.points.size() > 2 * view.coarse.size();
+                            });
     damping_ = options_.paper_mode ? 1e-3 : 1e-6;
-    bool coarse = has_coarse;
+    bool coarse = has_coarse, afresh = true;
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
-      match_and_scale(coarse, iteration == 0);
+      const std::size_t searched = match_and_scale(coarse, iteration == 0, afresh);
       if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
       const std::vector<EdgeSums> sums = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
       EdgeSums total;
@@ -320,7 +328,8 @@ class JointRefinement {
       if (outcome == Outcome::settled) damping_ = 1e-6;
       const bool quiet =
           outcome == Outcome::settled || motion < (coarse ? kCoarseMotion : options_.converged_motion) * usual_scale_;
-      if (!settled || !quiet) continue;
+      afresh = settled && quiet && !coarse && searched < edges_.size();
+      if (!settled || !quiet || afresh) continue;  // kept matches have the last word only if new ones agree
       if (!coarse) {
         result.converged = true;
         break;
@@ -390,7 +399,10 @@ class JointRefinement {
 
   void describe_edges(std::span<const EdgeSums> sums, Refinement& result) {
     std::vector<DirectedEdge> wide = edges_;
-    for (DirectedEdge& edge : wide) edge.reach_mm = start_reach();
+    for (DirectedEdge& edge : wide) {
+      edge.reach_mm = start_reach();
+      edge.searched = false;
+    }
     MatchRules wide_rules = rules(true);
     wide_rules.check_normals = true;
     find_matches(wide, views_, poses_, wide_rules, context_);
@@ -439,8 +451,18 @@ Result<void> RefineOptions::validate() const {
   return {};
 }
 
-Result<Refinement> refine(std::span<const View> views, std::span<const Link> links, const RefineOptions& options,
+RefineOptions RefineOptions::as_published() const {
+  RefineOptions published = *this;
+  published.paper_mode = true;
+  published.face_normals = published.rim_weights = published.incidence_weights = published.reach_weights = false;
+  published.edge_weights = published.anneal = published.coarse_to_fine = published.keep_matches = false;
+  published.drop_unheld = published.symmetric = false;
+  return published;
+}
+
+Result<Refinement> refine(std::span<const View> views, std::span<const Link> links, const RefineOptions& chosen,
                           const Context& context) {
+  const RefineOptions options = chosen.paper_mode ? chosen.as_published() : chosen;
   ASBUILT_CHECK(options.validate());
   if (views.empty()) return fail(ErrorCode::invalid_argument, "there are no views to refine");
   for (std::size_t i = 0; i < views.size(); ++i) ASBUILT_CHECK(check_view(views[i], i));

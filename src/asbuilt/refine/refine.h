@@ -8,6 +8,7 @@
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/pose.h"
 #include "asbuilt/core/result.h"
+#include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::refine {
 
@@ -16,6 +17,7 @@ struct View {
   PointCloud segment_in_scan;
   Pose model_from_scan = Pose::Identity();
   double noise_sigma_mm = 0.0;  ///< 0: unknown
+  scan::Viewpoint viewpoint{};  ///< in the scan frame, if known
 };
 
 /// Undirected link; both directions enter Eq. 5.
@@ -29,10 +31,21 @@ struct RefineOptions {
   double max_normal_angle_deg = 45.0;  ///< correspondences whose normals differ by more are dropped (ours)
   double start_distance_ratio = 0.04;  ///< farthest correspondence of the first step / diameter of the views (ours)
   double converged_motion = 0.02;      ///< stop when no view moves by more than this, in units of the residual noise
-  bool symmetric = false;              ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
-  bool paper_mode = false;             ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
+  // What goes beyond the paper; paper mode turns all of it off. What each is worth: bench/README.md, docs/refine.md.
+  bool face_normals = true;       ///< normals fitted to the points of one face, not across edges
+  bool rim_weights = true;        ///< points at a scan's rim hardly count: they may be mixed, and the surface ends
+  bool incidence_weights = true;  ///< residuals count by the noise that the viewpoint lets one expect of them
+  bool reach_weights = true;      ///< a match counts less the further it reaches beyond the plane that was fitted
+  bool edge_weights = true;       ///< edges count by their variance
+  bool anneal = true;             ///< reach and robust scale shrink from the misalignment to the noise
+  bool coarse_to_fine = true;     ///< a thinned sample until no view moves by more than half the noise
+  bool keep_matches = true;       ///< correspondences are searched again only where views have moved
+  bool drop_unheld = true;        ///< a link says nothing about directions that it does not hold
+  bool symmetric = false;         ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
+  bool paper_mode = false;        ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
 
   [[nodiscard]] Result<void> validate() const;
+  [[nodiscard]] RefineOptions as_published() const;  ///< paper mode, and everything beyond the paper off
 };
 
 template <class Visitor>
@@ -44,6 +57,15 @@ void for_each_field(RefineOptions& options, Visitor&& field) {
   field("start_distance_ratio", options.start_distance_ratio,
         "farthest correspondence at the start / diameter of all views together");
   field("converged_motion", options.converged_motion, "motion below which it stops, in units of the residual noise");
+  field("face_normals", options.face_normals, "normals fitted to the points of one face, not across edges");
+  field("rim_weights", options.rim_weights, "points at the rim of a scan hardly count");
+  field("incidence_weights", options.incidence_weights, "residuals count by the noise expected at their incidence");
+  field("reach_weights", options.reach_weights, "a match counts less beyond the plane that was fitted");
+  field("edge_weights", options.edge_weights, "links count by the variance of their residuals");
+  field("anneal", options.anneal, "reach and robust scale shrink from the misalignment to the noise");
+  field("coarse_to_fine", options.coarse_to_fine, "the first steps take a thinned sample");
+  field("keep_matches", options.keep_matches, "correspondences are searched again only where scans have moved");
+  field("drop_unheld", options.drop_unheld, "a link says nothing about directions that it does not hold");
   field("symmetric", options.symmetric, "symmetric point-to-plane residuals");
 }
 

@@ -9,6 +9,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/refine/local_planes.h"
 #include "asbuilt/scan/normals.h"
 
 namespace asbuilt::refine {
@@ -101,22 +102,30 @@ std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& clo
   return result;
 }
 
-void mark_borders(SampledView& view, double scan_spacing_mm, const Context& context) {
+// At a rim the sensor may have mixed the part with what stands behind it, and the surface ends there: such a point is
+// biased rather than noisy. It counts so little that it decides nothing where there are others, but not nothing: where
+// two scans share only their rims, these still hold them together.
+std::vector<float> rim_weights(const SampledView& view, double scan_spacing_mm, const Context& context) {
+  constexpr float kNearRim = 0.03F;
   const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
-  std::vector<char> border(places.size()), rim(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    border[i] = places[i] != Place::inside ? 1 : 0;
-    rim[i] = places[i] == Place::rim ? 1 : 0;
+  std::vector<char> rim(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) rim[i] = places[i] == Place::rim ? 1 : 0;
+  const std::vector<char> near_rim = dilated(rim, view.points, kRimInSpacings * scan_spacing_mm, context);
+  std::vector<float> weights(places.size());
+  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = near_rim[i] != 0 ? kNearRim : 1.0F;
+  return weights;
+}
+
+// Noise acts along the ray, and a small share of it across: of a surface seen at a slant less of it is felt.
+std::vector<float> incidence_variances(const PointCloud& points, const scan::Viewpoint& viewpoint) {
+  constexpr double kAcross = 0.1;  // variance across the ray, and whatever else does not depend on incidence
+  std::vector<float> variances(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d ray = viewpoint.towards_sensor(points.positions[i].cast<double>());
+    const double cosine = ray.dot(points.normals[i].cast<double>());
+    variances[i] = static_cast<float>(kAcross + (1.0 - kAcross) * cosine * cosine);
   }
-  // A plane fitted across an edge or over a rim leans; how far from it that is felt follows from the fit's neighbours.
-  const auto fitted = static_cast<double>(scan::neighbours_for_normals(view.noise_sigma_mm, scan_spacing_mm));
-  const double fit_radius_mm = std::sqrt(fitted / std::numbers::pi) * scan_spacing_mm;
-  std::vector<char> doubtful = dilated(border, view.points, fit_radius_mm, context);
-  const std::vector<char> near_rim =
-      dilated(rim, view.points, std::max(fit_radius_mm, kRimInSpacings * scan_spacing_mm), context);
-  for (std::size_t i = 0; i < doubtful.size(); ++i) doubtful[i] = doubtful[i] != 0 || near_rim[i] != 0 ? 1 : 0;
-  view.is_border = std::move(border);
-  view.is_doubtful = std::move(doubtful);
+  return variances;
 }
 
 }  // namespace
@@ -143,17 +152,25 @@ std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double
   return places;
 }
 
-SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, std::size_t points,
-                         std::size_t coarse_points, bool with_borders, const Context& context) {
+SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const scan::Viewpoint& viewpoint,
+                         const SamplingRules& rules, const Context& context) {
   SampledView view;
-  view.points = evenly_sampled(segment, points, context);
-  view.coarse = even_indices(view.points.positions, coarse_points, context);
+  view.points = evenly_sampled(segment, rules.points, context);
+  view.coarse = even_indices(view.points.positions, rules.coarse_points, context);
   view.noise_sigma_mm = noise_sigma_mm;
   view.tree = std::make_unique<const KdTree>(view.points.positions);
   view.spacing_mm = median_spacing(view.points.positions, *view.tree);
-  view.is_border.assign(view.points.size(), 0);
-  view.is_doubtful.assign(view.points.size(), 0);
-  if (with_borders && view.spacing_mm > 0.0) mark_borders(view, median_spacing(segment.positions), context);
+  const auto fitted = static_cast<double>(scan::neighbours_for_normals(noise_sigma_mm, view.spacing_mm));
+  view.fit_radius_mm = std::sqrt(fitted / std::numbers::pi) * view.spacing_mm;
+  if (rules.face_normals) {
+    view.points.normals = face_normals(view.points, *view.tree, noise_sigma_mm, view.spacing_mm, context);
+  }
+  view.weight.assign(view.points.size(), 1.0F);
+  view.variance.assign(view.points.size(), 1.0F);
+  if (rules.rim_weights && view.spacing_mm > 0.0) {
+    view.weight = rim_weights(view, median_spacing(segment.positions), context);
+  }
+  if (rules.incidence_weights && viewpoint.known()) view.variance = incidence_variances(view.points, viewpoint);
   for (const Eigen::Vector3f& point : view.points.positions) view.centroid += point.cast<double>();
   const auto count = static_cast<double>(view.points.size());
   view.centroid /= count;

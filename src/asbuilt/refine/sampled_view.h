@@ -8,6 +8,7 @@
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
+#include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::refine {
 
@@ -21,20 +22,30 @@ enum class Place : char { inside, edge, rim };
 [[nodiscard]] std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double spacing_mm,
                                            const Context& context);
 
+/// How views are sampled and what their points count.
+struct SamplingRules {
+  std::size_t points = 25000, coarse_points = 2500;
+  bool face_normals = true;       ///< normals fitted anew, to the points of one face only
+  bool rim_weights = true;        ///< what may be mixed with something behind it hardly counts
+  bool incidence_weights = true;  ///< where the viewpoint is known: a range errs along the ray
+};
+
 /// A view as the refinement works with it, in its own scan frame.
 struct SampledView {
   PointCloud points;                  ///< 20-30 k evenly spread points
   std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
-  std::vector<char> is_border;        ///< on an edge or a rim: what lies on it may lie beyond it, normals mean little
-  std::vector<char> is_doubtful;      ///< so close to an edge that its normal leans, or to a rim that it may be mixed
+  std::vector<float> weight;          ///< of each point, in (0, 1]
+  std::vector<float> variance;        ///< of each point along its normal, relative to one measured straight on
   double spacing_mm = 0.0;
+  double fit_radius_mm = 0.0;  ///< how far the plane at a point has been fitted
   double noise_sigma_mm = 0.0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   double radius_mm = 0.0;  ///< root mean squared distance from the centroid
   std::unique_ptr<const KdTree> tree;
 };
 
-[[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, std::size_t points,
-                                       std::size_t coarse_points, bool with_borders, const Context& context);
+[[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm,
+                                       const scan::Viewpoint& viewpoint, const SamplingRules& rules,
+                                       const Context& context);
 
 }  // namespace asbuilt::refine

@@ -14,7 +14,15 @@ class Contrast {
  public:
   Contrast(const model::PreparedModel& model, const ScanEvidence& scan, const EvidenceOptions& options)
       : model_(model), scan_(scan), options_(options) {
+    // Of samples much denser than the measurements a part is as telling as all of them: they are in an order in which
+    // any first few are spread out.
+    constexpr double kSamplesPerMeasurement = 3.0;
+    constexpr std::size_t kFewest = 5000;
+    const std::size_t all = model.dense_samples.size();
     weight_ = measurements_per_sample(model, scan.scan);
+    asked_ = std::clamp(static_cast<std::size_t>(kSamplesPerMeasurement * weight_ * static_cast<double>(all)),
+                        std::min(kFewest, all), all);
+    weight_ = std::min(1.0, weight_ * static_cast<double>(all) / static_cast<double>(asked_));
   }
 
   // Asks the scan about the samples that `own` puts where `other` has nothing.
@@ -22,7 +30,7 @@ class Contrast {
     const Pose scan_from_own = own_from_scan.inverse();
     const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
     const PointCloud& samples = model_.dense_samples;
-    for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (std::size_t i = 0; i < asked_; ++i) {
       const double apart = distance_at(other_from_own * samples.positions[i]);
       if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
@@ -75,7 +83,8 @@ class Contrast {
   const model::PreparedModel& model_;
   const ScanEvidence& scan_;
   const EvidenceOptions& options_;
-  double weight_ = 1.0;
+  double weight_ = 1.0;  // of a sample, in measurements
+  std::size_t asked_ = 0;
 };
 
 }  // namespace

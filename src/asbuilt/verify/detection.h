@@ -47,6 +47,7 @@ struct Candidate {
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
   double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
   double slip_lead = 0.0;      ///< measurements by which it leads over any small slip; asked where the surface is loose
+  int loose_directions = 0;    ///< in which the surface that was found does not hold it
   double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;   ///< model samples that the scan confirms
   double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does

@@ -26,47 +26,66 @@ double largest_motion_mm(const Vector6d& twist, const model::PreparedModel& mode
   return std::sqrt(largest);
 }
 
-// Both ways along those of the loosest directions that hold less than `below` of information.
-std::vector<Pose> slips(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
-                        double slip_mm, double below) {
+// The loosest directions, those that hold less than `below` of information, as twists.
+std::vector<Vector6d> loosest(const PoseEvidence& evidence, const model::PreparedModel& model, double below) {
   // A turn that the part's symmetry makes invisible is no slip.
   Matrix6d information = evidence.information;
   for (const Vector6d& twist : free_twists(model)) {
     information += 1e3 * evidence.information.trace() * twist * twist.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
-  const Eigen::Vector3d centre = model.box.center();
-  std::vector<Pose> slipped;
+  std::vector<Vector6d> twists;
   for (int k = 0; k < kLoosest && solver.eigenvalues()[k] < below; ++k) {
     Vector6d twist = solver.eigenvectors().col(k);
     twist.head<3>() /= 0.5 * model.diameter;  // the evidence measures rotations by the motion at half a diameter
-    const double unit = largest_motion_mm(twist, model);
-    if (!(unit > 0.0)) continue;
-    for (const double sign : {-1.0, 1.0}) {
-      slipped.push_back(stepped(model_from_scan, sign * slip_mm / unit * twist, centre));
-    }
+    twists.push_back(twist);
   }
-  return slipped;
+  return twists;
 }
 
 }  // namespace
 
+int loose_directions(const PoseEvidence& evidence, const model::PreparedModel& model, double min_held) {
+  return static_cast<int>(loosest(evidence, model, min_held * static_cast<double>(evidence.explained_samples)).size());
+}
+
 std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                const model::PreparedModel& model, double min_held, double slip_mm) {
-  return slips(model_from_scan, evidence, model, slip_mm, min_held * static_cast<double>(evidence.explained_samples));
+                                const model::PreparedModel& model, double min_held, double slip_mm, Slips kinds) {
+  const std::vector<Vector6d> twists =
+      loosest(evidence, model, min_held * static_cast<double>(evidence.explained_samples));
+  const Eigen::Vector3d centre = model.box.center();
+  int combinations = 1;
+  for (std::size_t k = 0; k < twists.size(); ++k) combinations *= 3;
+  std::vector<Pose> slipped;
+  for (int combination = 0; combination < combinations; ++combination) {
+    Vector6d twist = Vector6d::Zero();
+    int digits = combination, mixed = 0;
+    for (const Vector6d& direction : twists) {
+      twist += static_cast<double>(digits % 3 - 1) * direction;
+      mixed += digits % 3 != 1 ? 1 : 0;
+      digits /= 3;
+    }
+    if (kinds == Slips::single && mixed > 1) continue;
+    const double unit = largest_motion_mm(twist, model);
+    if (!(unit > 0.0)) continue;
+    slipped.push_back(stepped(model_from_scan, slip_mm / unit * twist, centre));
+  }
+  return slipped;
 }
 
 Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
                            double min_held, const ScanEvidence& scan, const EvidenceOptions& options) {
-  constexpr double kSteps[] = {0.03, 0.015, 0.0075};  // of the diameter
-  constexpr int kMostMoves = 4;                       // of each
-  constexpr double kLeastGain = 2.0;                  // measurements
+  constexpr double kSteps[] = {0.03, 0.015, 0.0075, 0.004};  // of the diameter
+  constexpr double kFine = 0.01;                             // where valleys across the directions matter
+  constexpr int kMostMoves = 4;                              // of each
+  constexpr double kLeastGain = 2.0;                         // measurements
   Pose settled = model_from_scan;
   for (const double step : kSteps) {
     for (int move = 0; move < kMostMoves; ++move) {
       const Pose here = settled;
       double most = kLeastGain;
-      for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter)) {
+      const Slips kinds = step > kFine ? Slips::single : Slips::combined;
+      for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter, kinds)) {
         const PoseContrast seen = contrast(here, slipped, model, scan, options);
         if (seen.for_second - seen.for_first <= most) continue;
         most = seen.for_second - seen.for_first;
@@ -82,7 +101,7 @@ double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& ev
                              const model::PreparedModel& model, double min_held, double slip_mm,
                              const ScanEvidence& scan, const EvidenceOptions& options) {
   double least = std::numeric_limits<double>::infinity();
-  for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, min_held, slip_mm)) {
+  for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, min_held, slip_mm, Slips::combined)) {
     const PoseContrast seen = contrast(model_from_scan, slipped, model, scan, options);
     least = std::min(least, seen.for_first - seen.for_second);
   }

@@ -9,11 +9,19 @@
 
 namespace asbuilt::verify {
 
-/// The poses into which a part can slip: both ways along each loose direction of the surface that was found (the
-/// eigenvectors of PoseEvidence::information with less than `min_held` per explained sample, at most three), each
-/// moving the surface by `slip_mm` where it moves most. Turns that the part's symmetry allows are no slips.
+/// How many loose directions the surface that was found has: eigenvectors of PoseEvidence::information with less than
+/// `min_held` per explained sample, at most three (a plane's). Turns that the part's symmetry allows do not count.
+[[nodiscard]] int loose_directions(const PoseEvidence& evidence, const model::PreparedModel& model, double min_held);
+
+/// Both ways along each loose direction alone (2, 4 or 6 slips), or along all their sums and differences too (2, 8 or
+/// 26): an edge may be followed by a shift and a turn at once.
+enum class Slips { single, combined };
+
+/// The poses into which a part can slip, each moving the surface by `slip_mm` where it moves most. The
+/// i-th and the i-th last are opposite.
 [[nodiscard]] std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                              const model::PreparedModel& model, double min_held, double slip_mm);
+                                              const model::PreparedModel& model, double min_held, double slip_mm,
+                                              Slips kinds);
 
 /// The pose moved along its loose directions (as above) for as long as the scan prefers the slipped pose, in steps of 3
 /// % of the diameter and less. A surface without its edges leaves registration free to drift there; the edges are asked

@@ -35,15 +35,18 @@ double proof_needed(const Candidate& c, const VerifyOptions& options) {
 }
 
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
-// the surface does, nearly all of it must be found, and less may speak against it.
+// the surface does, the more so the more ways there are to slip, and less may speak against it. Without rays nothing
+// tells what the sensor looked past, which is most of what an edge can show.
 double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
-  constexpr double kShare = 0.012;  // of the measurements explained
-  return std::max(1.25 * options.min_contrast, kShare * c.explained_measurements);
+  constexpr double kShare = 0.006;  // of the measurements explained
+  constexpr double kFurtherDirection = 0.75, kWithoutRays = 6.0;
+  const double directions = 1.0 + kFurtherDirection * std::max(0, c.loose_directions - 1);
+  const double needed = directions * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
+  return c.without_rays ? kWithoutRays * needed : needed;
 }
 
 bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
-  constexpr double kNearlyAll = 0.9;  // of what should be visible, as a score
-  return c.score >= kNearlyAll && c.slip_lead >= edge_measurements_needed(c, options) &&
+  return c.slip_lead >= edge_measurements_needed(c, options) &&
          c.contradiction_share <= 0.75 * options.max_contradiction_share;
 }
 
@@ -178,6 +181,23 @@ void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedM
   }
 }
 
+// Largest distance of the part's surface at one pose from that at another; infinite beyond the field.
+double surface_apart_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
+  const Eigen::Isometry3f a_from_b = (a_from_scan * b_from_scan.inverse()).cast<float>();
+  float largest = 0.0F;
+  for (const Eigen::Vector3f& sample : model.dense_samples.positions) {
+    largest = std::max(largest, std::abs(model.field->at(a_from_b * sample).distance));
+  }
+  return static_cast<double>(largest);
+}
+
+// Two poses that put the surface at the same places but for less than parts deviate by: where the scan does not tell
+// them apart, the pose is known modulo the motion between them.
+bool are_nearly_equal(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model,
+                      const VerifyOptions& options) {
+  return surface_apart_mm(a_from_scan, b_from_scan, model) <= options.near_equal_ratio * model.diameter;
+}
+
 // A different pose that would itself be accepted and that nothing tells from the best.
 Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedModel& model,
                 const VerifyOptions& options, const Comparison& compare, bool one_of_several) {
@@ -193,6 +213,10 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     if (compare) contrast = compare(best, rival);
     const Outcome outcome = contrast ? winner(*contrast, options) : Outcome::undecided;
     const bool leads = best.support - rival.support >= options.min_margin * best.support;
+    if (outcome == Outcome::undecided &&
+        are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
+      continue;
+    }
     if (outcome == Outcome::second || (outcome == Outcome::undecided && !leads)) {
       return too_alike(best, rival, contrast, model, options);
     }
@@ -200,13 +224,24 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
   return {};
 }
 
-// Loose in nothing but a turn about an axis of near-symmetry: the place is known, the angle is not.
-Finding unknown_turn(Candidate c, const VerifyOptions& options) {
-  if (options.paper_mode || c.weakest_but_near < options.min_weakest_direction) return {};
+// Whether it is loose in nothing but turns about the part's axes of near-symmetry.
+bool is_loose_in_turn_only(Candidate c, const VerifyOptions& options) {
+  if (options.paper_mode || c.weakest_but_near < options.min_weakest_direction) return false;
   c.weakest_direction = c.weakest_but_near;
-  if (objection(c, options).reason != Reason::none) return {};
-  return {Reason::ambiguous_pose,
-          "the scan does not show what tells the part's turns about its axis of near-symmetry from one another"};
+  return objection(c, options).reason == Reason::none;
+}
+
+// Whether every turn about an axis of near-symmetry leaves the surface nearly where it is.
+bool turns_are_nearly_equal(const Candidate& c, const model::PreparedModel& model, const VerifyOptions& options) {
+  constexpr int kTurns = 7;
+  constexpr double kGolden = 0.381966011250105;  // of a turn, so that no order of a symmetry divides them all
+  for (const model::NearAxis& axis : model.symmetry.near_axes) {
+    for (int i = 1; i <= kTurns; ++i) {
+      const Pose turn = model::rotation_about(axis.axis, axis.point, 2.0 * std::numbers::pi * kGolden * i);
+      if (!are_nearly_equal(c.model_from_scan, turn * c.model_from_scan, model, options)) return false;
+    }
+  }
+  return !model.symmetry.near_axes.empty();
 }
 
 std::string acceptance(const Candidate& best, const model::PreparedModel& model, const VerifyOptions& options) {
@@ -280,6 +315,17 @@ bool is_comparable(const Candidate& rival, const Candidate& best) {
   return proof(rival) >= kProofShare * proof(best) && rival.support >= kSupportShare * best.support;
 }
 
+bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options) {
+  constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
+  if (detection.status != Status::accepted || options.paper_mode) return false;
+  const Candidate& best = detection.best;
+  const bool is_held_firmly = best.weakest_direction >= kTwice * options.min_weakest_direction ||
+                              best.slip_lead >= kTwice * edge_measurements_needed(best, options);
+  return is_held_firmly && proof(best) >= proof_needed(best, options) + kProofToSpare &&
+         best.contradiction_share <= kHalf * options.max_contradiction_share &&
+         best.overrun_share <= kHalf * options.max_overrun_share;
+}
+
 bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
   return distance_of_centres_mm(a, b, model) <= kSamePlace * model.diameter;
 }
@@ -315,13 +361,18 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   detection.margin = detection.best.support - (detection.candidates.size() > 1 ? detection.candidates[1].support : 0.0);
 
   Finding finding = objection(detection.best, options);
-  if (finding.reason == Reason::under_constrained) {
-    if (Finding turn = unknown_turn(detection.best, options); turn.reason != Reason::none) {
-      detection.status = Status::ambiguous;
-      detection.reason = turn.reason;
-      detection.explanation = std::move(turn.explanation);
-      return detection;
-    }
+  const bool turn_is_unknown =
+      finding.reason == Reason::under_constrained && is_loose_in_turn_only(detection.best, options);
+  if (turn_is_unknown && !turns_are_nearly_equal(detection.best, model, options)) {
+    detection.status = Status::ambiguous;
+    detection.reason = Reason::ambiguous_pose;
+    detection.explanation =
+        "the scan does not show what tells the part's turns about its axis of near-symmetry from one another";
+    return detection;
+  }
+  if (turn_is_unknown) {
+    detection.best.objection = detection.candidates.front().objection = Reason::none;
+    finding = {};
   }
   if (finding.reason != Reason::none) {
     detection.reason = finding.reason;
@@ -333,6 +384,11 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   detection.status = finding.reason == Reason::none ? Status::accepted : Status::ambiguous;
   detection.explanation =
       finding.reason == Reason::none ? acceptance(detection.best, model, options) : std::move(finding.explanation);
+  if (detection.status == Status::accepted && turn_is_unknown) {
+    detection.explanation += fmt::format(
+        "; its turn about the part's axis is not known, but moves no surface by more than {:.1f} % of the diameter",
+        100.0 * options.near_equal_ratio);
+  }
   return detection;
 }
 

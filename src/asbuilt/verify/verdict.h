@@ -34,6 +34,9 @@ namespace asbuilt::verify {
 /// Whether the part's centre is at about the same place in both.
 [[nodiscard]] bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model);
 
+/// Whether an accepted pose clears every limit by so much that searching the scan further could not unsettle it.
+[[nodiscard]] bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options);
+
 /// Whether a rival would be a second placement of the part beside the best candidate: in another place, comparable, and
 /// nothing stands against it on its own.
 [[nodiscard]] bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,

@@ -31,10 +31,15 @@ constexpr double kContradictionWeight = 3.0;
 // Of the diameter. A pose that could be displaced so far unnoticed is not known.
 constexpr double kSlips[] = {0.03, 0.1};
 
+// Edges are read to within so many times the scatter of the points on the model, but to no less than a share of the
+// distance that counts as on it.
+constexpr double kEdgeScatter = 4.0, kFinestEdge = 0.3;
+
 // Of the diameter: how far past its edges the part's surface must not go on.
 constexpr double kRimReach = 0.03;
 constexpr std::size_t kMostRimSamples = 3000;
 
+constexpr double kClearly = 2.0;     // times the contradictions allowed: such a pose is wrong, even if not yet precise
 constexpr double kPlausible = 0.75;  // of the score that is needed: where it pays to look for a better place
 
 constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
@@ -73,19 +78,23 @@ std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<
   return background;
 }
 
-std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance) {
+// A quick look carries fewer candidates along: what it does not settle is looked at again.
+std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance, Look look) {
   const double d = model.sampling_distance;
-  return {{{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, 40, &model.samples, 1.0, false},
-           {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, 16, &model.samples, 2.0, true},
-           {0.3 * d,
-            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-            final_distance,
-            3000,
-            3000,
-            8,
-            &model.dense_samples,
-            kContradictionWeight,
-            true}}};
+  const bool is_quick = look == Look::quick;
+  const std::size_t first = is_quick ? 16 : 40, second = is_quick ? 8 : 16, third = is_quick ? 4 : 8;
+  return {
+      {{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, first, &model.samples, 1.0, false},
+       {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, second, &model.samples, 2.0, true},
+       {0.3 * d,
+        {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+        final_distance,
+        3000,
+        3000,
+        third,
+        &model.dense_samples,
+        kContradictionWeight,
+        true}}};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -140,7 +149,9 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const mod
   candidate.support = evidence.support(contradiction_weight);
 }
 
-class Verification {
+}  // namespace
+
+class Judge::Verification {
  public:
   Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
                const Context& context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled)
@@ -154,11 +165,14 @@ class Verification {
         final_distance_(score_distance(scan, model, options)),
         shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
         rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
-        rim_probes_(rim_probes(model, rim_reach_, kMostRimSamples)) {}
+        rim_probes_(rim_probes(model, rim_reach_, kMostRimSamples)),
+        one_of_several_(!taken.empty()) {}
+
+  [[nodiscard]] Result<Detection> verdict_on(std::vector<Candidate> candidates, Look look, bool accept_anyway) const;
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
-  [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates) const {
-    for (const Level& level : pyramid(model_, final_distance_)) {
+  [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates, Look look) const {
+    for (const Level& level : pyramid(model_, final_distance_, look)) {
       const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
@@ -175,7 +189,7 @@ class Verification {
     constexpr double kLeaderShare = 0.7, kPromisingShare = 0.7;  // of the best support
     if (options_.paper_mode || candidates.empty() || !model_.symmetry.has_near()) return candidates;
     const double best_support = candidates.front().support;
-    const Level level = pyramid(model_, final_distance_).back();
+    const Level level = pyramid(model_, final_distance_, Look::thorough).back();
     const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
     std::vector<Candidate> near;
     for (std::size_t i = 0; i < std::min(kMostLeaders, candidates.size()); ++i) {
@@ -196,6 +210,16 @@ class Verification {
     return best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
   }
 
+  // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
+  // place. The first is not refuted, if any is not: put_refuted_last.
+  [[nodiscard]] std::vector<Candidate> contenders(std::vector<Candidate> candidates) const {
+    constexpr double kShare = 0.2;
+    if (options_.paper_mode || candidates.empty()) return candidates;
+    const double least = kShare * candidates.front().support;
+    std::erase_if(candidates, [&](const Candidate& c) { return c.support < least; });
+    return candidates;
+  }
+
   // Before the last registration, which takes away what the group's own inexactness adds.
   void make_canonical(Candidate& candidate) const {
     if (!options_.paper_mode) candidate.model_from_scan = model_.symmetry.canonical(candidate.model_from_scan);
@@ -210,34 +234,43 @@ class Verification {
   void register_densely(Candidate& candidate) const {
     make_canonical(candidate);
     constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
+    constexpr std::size_t kFewPoints = 2000;   // enough to come close
     constexpr int kFewIterations = 30, kManyIterations = 300;
     const std::vector<Eigen::Vector3f> around =
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
     bool has_converged = false;
-    const auto register_at = [&](double scale_mm, int most_iterations) {
-      const LmIcpResult result = lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint,
+    const auto register_at = [&](double scale_mm, int most_iterations, std::size_t most_points) {
+      const auto points = std::span(around).first(std::min(most_points, around.size()));
+      const LmIcpResult result = lm_icp(points, candidate.model_from_scan, model_, scan_.viewpoint,
                                         {scale_mm, most_iterations, only_facing()});
       candidate.model_from_scan = result.model_from_scan;
       candidate.rms_mm = result.rms_mm;
       candidate.residual_ratio = result.rms_mm / final_distance_;
       has_converged = result.iterations < most_iterations;
     };
-    register_at(1.5 * final_distance_, kFewIterations);
-    register_at(final_distance_, kFewIterations);
+    register_at(1.5 * final_distance_, kFewIterations, kFewPoints);
+    register_at(final_distance_, kFewIterations, kMostPoints);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
     const auto judged_densely = [&] {
       return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     };
     PoseEvidence evidence = judged_densely();
-    const bool is_plausible = candidate.score >= kPlausible * options_.acceptance_score;
+    const bool is_plausible = candidate.score >= kPlausible * options_.acceptance_score &&
+                              candidate.contradiction_share <= kClearly * options_.max_contradiction_share;
     if (is_plausible && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
-      register_at(final_distance_, kManyIterations);
+      register_at(final_distance_, kManyIterations, kMostPoints);
       evidence = judged_densely();
     }
-    const bool is_loose = candidate.weakest_direction < options_.min_weakest_direction;
-    if (!options_.paper_mode && is_loose && is_plausible) {
+    const auto is_loose = [&] {
+      return !options_.paper_mode && is_plausible && candidate.weakest_direction < options_.min_weakest_direction;
+    };
+    // What edges show is read as finely as this part fits, not as deviating parts may.
+    const double edge_distance =
+        std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance_, final_distance_);
+    const EvidenceOptions edge_options{edge_distance, lateral(edge_distance)};
+    if (is_loose()) {
       const Pose settled = settled_between_edges(candidate.model_from_scan, evidence, model_,
-                                                 options_.min_weakest_direction, evidence_, options);
+                                                 options_.min_weakest_direction, evidence_, edge_options);
       if (settled.matrix() != candidate.model_from_scan.matrix()) {
         candidate.model_from_scan = settled;
         evidence = judged_densely();
@@ -246,13 +279,14 @@ class Verification {
     candidate.without_rays = !options_.paper_mode && !scan_.viewpoint.known();
     if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
-    if (!options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction) {
+    if (is_loose()) {
+      candidate.loose_directions = loose_directions(evidence, model_, options_.min_weakest_direction);
       candidate.slip_lead = std::numeric_limits<double>::infinity();
       for (const double slip : kSlips) {
         candidate.slip_lead =
             std::min(candidate.slip_lead,
                      least_lead_over_slips(candidate.model_from_scan, evidence, model_, options_.min_weakest_direction,
-                                           slip * model_.diameter, evidence_, options));
+                                           slip * model_.diameter, evidence_, edge_options));
       }
     }
     candidate.overrun_share =
@@ -286,7 +320,6 @@ class Verification {
 
   void put_refuted_last(const Level& level, std::vector<Candidate>& candidates) const {
     constexpr std::size_t kMostProbes = 600;
-    constexpr double kClearly = 2.0;  // times the contradictions allowed, as the pose is not yet precise
     const auto probes = std::span(rim_probes_).first(std::min(kMostProbes, rim_probes_.size()));
     const EvidenceOptions options{level.score_distance_mm, lateral(level.score_distance_mm)};
     parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
@@ -368,9 +401,8 @@ class Verification {
   std::vector<Eigen::Vector3f> shuffled_foreground_;
   double rim_reach_;
   std::vector<RimProbe> rim_probes_;
+  bool one_of_several_;
 };
-
-}  // namespace
 
 Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("score_distance", score_distance_mm, 0.0, 1e6));
@@ -389,17 +421,43 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("no_rays_surcharge", no_rays_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("near_equal_ratio", near_equal_ratio, 0.0, 0.1));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }
 
-Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
-                         std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
-                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken,
-                         const detect::SampledScan* sampled) {
+Result<Detection> Judge::Verification::verdict_on(std::vector<Candidate> candidates, Look look,
+                                                  bool accept_anyway) const {
+  candidates = contenders(with_near_poses(coarse_to_fine(std::move(candidates), look)));
+  parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
+    if (!context_.cancelled()) register_densely(candidates[i]);
+  });
+  if (context_.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
+
+  const auto compare = [&](const Candidate& first, const Candidate& second) { return contrast_of(first, second); };
+  Detection detection = decide(std::move(candidates), model_, options_, compare, one_of_several_);
+  if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
+    detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
+    detection.status = Status::accepted;
+    detection.reason = Reason::none;
+  }
+  if (detection.status != Status::rejected) cut_out(detection);
+  return detection;
+}
+
+Judge::Judge(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
+             const Context& context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled) {
+  ASBUILT_EXPECT(options.validate().has_value(), "valid options");
   ASBUILT_EXPECT(taken.empty() || taken.size() == scan.cloud.size(), "one byte a point of the scan");
-  ASBUILT_CHECK(options.validate());
+  verification_ = std::make_unique<const Verification>(scan, model, options, context, taken, sampled);
+}
+Judge::~Judge() = default;
+Judge::Judge(Judge&&) noexcept = default;
+Judge& Judge::operator=(Judge&&) noexcept = default;
+
+Result<Detection> Judge::verdict_on(std::span<const detect::Hypothesis> hypotheses, Look look,
+                                    bool accept_anyway) const {
   std::vector<Candidate> candidates;
   for (const detect::Hypothesis& hypothesis : hypotheses) {
     Candidate candidate;
@@ -407,24 +465,15 @@ Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& mod
     candidate.votes = hypothesis.votes;
     candidates.push_back(candidate);
   }
-  const Verification verification(scan, model, options, context, taken, sampled);
-  candidates = verification.with_near_poses(verification.coarse_to_fine(std::move(candidates)));
-  parallel_for(context, candidates.size(), 1, [&](std::size_t i) {
-    if (!context.cancelled()) verification.register_densely(candidates[i]);
-  });
-  if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
+  return verification_->verdict_on(std::move(candidates), look, accept_anyway);
+}
 
-  const auto compare = [&](const Candidate& first, const Candidate& second) {
-    return verification.contrast_of(first, second);
-  };
-  Detection detection = decide(std::move(candidates), model, options, compare, !taken.empty());
-  if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
-    detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
-    detection.status = Status::accepted;
-    detection.reason = Reason::none;
-  }
-  if (detection.status != Status::rejected) verification.cut_out(detection);
-  return detection;
+Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
+                         std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
+                         const Context& context, bool accept_anyway, std::span<const std::uint8_t> taken,
+                         const detect::SampledScan* sampled) {
+  ASBUILT_CHECK(options.validate());
+  return Judge(scan, model, options, context, taken, sampled).verdict_on(hypotheses, Look::thorough, accept_anyway);
 }
 
 }  // namespace asbuilt::verify

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "asbuilt/core/context.h"
@@ -32,8 +33,9 @@ struct VerifyOptions {
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
-  double max_overrun_share = 0.2;         ///< of the edges past which the scan's surface may go on
-  double max_normal_angle_deg = 30.0;     ///< normals closer than this agree
+  double near_equal_ratio = 0.01;  ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
+  double max_overrun_share = 0.2;  ///< of the edges past which the scan's surface may go on
+  double max_normal_angle_deg = 30.0;  ///< normals closer than this agree
   bool paper_mode = false;
 
   [[nodiscard]] Result<void> validate() const;
@@ -72,17 +74,40 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("missing_surcharge", options.missing_surcharge, "likewise per share that returned nothing");
   field("no_rays_surcharge", options.no_rays_surcharge, "likewise where the viewpoint is unknown");
   field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
+  field("near_equal_ratio", options.near_equal_ratio,
+        "distance / diameter within which the surfaces of two poses need not be told apart");
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
-/// Judges hypotheses, best first: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part out.
-/// A pose that the user vouches for (`--accept`, `--poses`) enters as a hypothesis; `accept_anyway` skips the verdict
-/// for the best of them and says so in the explanation.
-///
-/// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong to
-/// those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the
-/// caller. `sampled`, if it is at hand, is the scan as detection looked at it.
+/// How many candidates go through the pyramid: a quick look carries less than half of them.
+enum class Look { quick, thorough };
+
+/// Judges hypotheses about one scan: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part
+/// out. What the scan is asked by (trees, depth image, planes) is made once, for any number of questions.
+class Judge {
+ public:
+  /// With `taken` (one byte a point of the scan) the best of several placements is sought: points marked in it belong
+  /// to those known already, they confirm nothing, but are cut out with the rest; and rivals elsewhere are left to the
+  /// caller. `sampled`, if it is at hand, is the scan as detection looked at it. Scan, model, options (valid ones) and
+  /// context have to outlive the judge.
+  Judge(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options, const Context& context,
+        std::span<const std::uint8_t> taken = {}, const detect::SampledScan* sampled = nullptr);
+  ~Judge();
+  Judge(Judge&&) noexcept;
+  Judge& operator=(Judge&&) noexcept;
+
+  /// A pose that the user vouches for (`--accept`, `--poses`) enters as a hypothesis; `accept_anyway` skips the verdict
+  /// for the best of them and says so in the explanation. Errors: cancelled.
+  [[nodiscard]] Result<Detection> verdict_on(std::span<const detect::Hypothesis> hypotheses, Look look = Look::thorough,
+                                             bool accept_anyway = false) const;
+
+ private:
+  class Verification;
+  std::unique_ptr<const Verification> verification_;
+};
+
+/// One question to a judge of its own.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
                                        std::span<const detect::Hypothesis> hypotheses, const VerifyOptions& options,
                                        const Context& context, bool accept_anyway = false,

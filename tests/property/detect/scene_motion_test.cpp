@@ -158,6 +158,23 @@ TEST(FindHypotheses, GivesTheSameBytesForAnyNumberOfThreads) {
   }
 }
 
+TEST(HypothesisSearch, GivesTheSameInStepsAsAtOnce) {
+  const simulate::Simulation simulation = cluttered_scans(1);
+  const scan::Scan scan = prepared(simulation.scans.front(), part().context);
+  const SampledScan sampled = sampled_scan(scan, part().book->sampling_distance, part().book->diameter, part().context);
+  HypothesisSearch at_once(scan, sampled, *part().book, {}), in_steps(scan, sampled, *part().book, {});
+  ASSERT_TRUE(at_once.vote(300, part().context));
+  for (const int wanted : {1, 40, 40, 199, 300}) ASSERT_TRUE(in_steps.vote(wanted, part().context));
+  EXPECT_EQ(in_steps.votes_cast(), at_once.votes_cast());
+  EXPECT_GT(at_once.votes_cast(), 0U);
+  const auto expected = at_once.hypotheses(100, part().context), found = in_steps.hypotheses(100, part().context);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].votes, expected[i].votes);
+    EXPECT_EQ(found[i].model_from_scan.matrix(), expected[i].model_from_scan.matrix());
+  }
+}
+
 TEST(DetectionScene, LeavesTheFloorOutAndKeepsThePart) {
   const simulate::Simulation simulation = cluttered_scans(2);
   for (const simulate::SimulatedScan& simulated : simulation.scans) {

@@ -15,7 +15,8 @@ using ::testing::IsEmpty;
 
 TEST(EdgeSelection, WeakPairsAreUsedOnlyUntilTheGraphIsConnected) {
   const std::vector<PairOverlap> overlaps{{0, 1, 0.8}, {1, 2, 0.2}, {0, 2, 0.15}};
-  const EdgeSelection selection = select_edges(3, overlaps).value();
+  const EdgeSelectionOptions options{0.1, 0.3, 0, true};
+  const EdgeSelection selection = select_edges(3, overlaps, options).value();
   EXPECT_THAT(selection.edges, ElementsAre(PairOverlap{0, 1, 0.8}, PairOverlap{1, 2, 0.2}));
   EXPECT_THAT(selection.components, ElementsAre(ElementsAre(0, 1, 2)));
 }
@@ -47,7 +48,7 @@ TEST(EdgeSelection, ThresholdsThemselvesAreInclusive) {
 }
 
 TEST(EdgeSelection, ScansWithoutLinksFormComponentsOfTheirOwn) {
-  const std::vector<PairOverlap> overlaps{{1, 3, 0.9}, {0, 2, 0.05}};
+  const std::vector<PairOverlap> overlaps{{1, 3, 0.9}, {0, 2, 0.04}};
   const EdgeSelection selection = select_edges(4, overlaps).value();
   EXPECT_THAT(selection.components, ElementsAre(ElementsAre(1, 3), ElementsAre(0), ElementsAre(2)));
 }

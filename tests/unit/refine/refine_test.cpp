@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <limits>
+#include <string_view>
+#include <type_traits>
 
 #include "property/refine/bumpy_body.h"
 
@@ -155,6 +157,32 @@ TEST(Refine, OptionsOutOfRangeAreRefused) {
   EXPECT_TRUE(refused([](RefineOptions& o) { o.max_normal_angle_deg = 120.0; }));
   EXPECT_TRUE(refused([](RefineOptions& o) { o.start_distance_ratio = 0.0; }));
   EXPECT_TRUE(refused([](RefineOptions& o) { o.converged_motion = std::nan(""); }));
+}
+
+TEST(Refine, AsPublishedIsEverySwitchOff) {
+  RefineOptions published = RefineOptions{}.as_published();
+  EXPECT_TRUE(published.paper_mode);
+  for_each_field(published, [](std::string_view name, const auto& value, std::string_view) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) {
+      EXPECT_FALSE(value) << name;
+    }
+  });
+}
+
+TEST(Refine, KeepingMatchesEndsWhereSearchingAlwaysEnds) {
+  const test::Scene scene = test::bumpy_scene({}, 6);
+  RefineOptions always;
+  always.keep_matches = false;
+  const Refinement kept = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  const Refinement searched = refine::refine(scene.views, scene.links, always, Context(2)).value();
+  double largest = 0.0;
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    for (const Eigen::Vector3f& point : scene.views[v].segment_in_scan.positions) {
+      const Eigen::Vector3d p = point.cast<double>();
+      largest = std::max(largest, (kept.model_from_scan[v] * p - searched.model_from_scan[v] * p).norm());
+    }
+  }
+  EXPECT_LT(largest, 0.02);  // a fifth of the noise of one point (0.1 mm); either stops at motions of 0.002 mm
 }
 
 TEST(Refine, StopsWhenAskedTo) {

@@ -46,11 +46,12 @@ constexpr double kEveryDirection = std::numeric_limits<double>::infinity();
 // Where a box moves most is a corner; the samples that are asked lie next to it.
 TEST(Slip, PosesMoveTheSurfaceByTheGivenWayBothWays) {
   const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
-  const auto slipped = slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kEveryDirection, 4.0);
+  const auto slipped =
+      slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kEveryDirection, 4.0, Slips::single);
   ASSERT_EQ(slipped.size(), 6U);
   for (const Pose& pose : slipped) EXPECT_NEAR(displacement_mm(pose, brick.model_from_scan, brick.model), 4.2, 0.25);
-  for (std::size_t i = 0; i < slipped.size(); i += 2) {
-    EXPECT_NEAR(displacement_mm(slipped[i], slipped[i + 1], brick.model), 8.4, 0.5);
+  for (std::size_t i = 0; i < slipped.size() / 2; ++i) {
+    EXPECT_NEAR(displacement_mm(slipped[i], slipped[slipped.size() - 1 - i], brick.model), 8.4, 0.5);
   }
 }
 
@@ -62,12 +63,19 @@ TEST(Slip, ABoxThatShowsThreeFacesIsHeldByThem) {
 
 TEST(Slip, DirectionsThatTheSurfaceHoldsAreNotTried) {
   const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
-  EXPECT_TRUE(
-      slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kLimits.min_weakest_direction, 4.0).empty());
+  EXPECT_TRUE(slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kLimits.min_weakest_direction, 4.0,
+                            Slips::single)
+                  .empty());
   const Asked slab(simulate::box({400, 400, 40}), Pose(Eigen::Translation3d(0, 0, 500)), {}, 0.25);
   const auto slipped =
-      slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction, 4.0);
+      slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction, 4.0, Slips::single);
   EXPECT_EQ(slipped.size(), 6U) << "two shifts along the face and the turn in it, both ways";
+  EXPECT_EQ(slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction, 4.0,
+                          Slips::combined)
+                .size(),
+            26U)
+      << "and all their sums and differences";
+  EXPECT_EQ(loose_directions(slab.evidence, slab.model, kLimits.min_weakest_direction), 3);
 }
 
 // The field of view ends on the face, so that nothing but a plane is seen.

@@ -81,23 +81,44 @@ TEST(Verdict, AsksForMoreProofWhereMoreIsHidden) {
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
-TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndNoContradiction) {
+TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradiction) {
   Candidate candidate = flawless();
-  candidate.weakest_direction = 0.0, candidate.explained_measurements = 2000.0;
-  candidate.slip_lead = 20.0;  // 1.2 % of 2000 are 24
+  candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0;
+  candidate.slip_lead = 20.0;  // 0.6 % of 4000 are 24
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
-  candidate.slip_lead = 50.0;
+  candidate.slip_lead = 28.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
   candidate.contradiction_share = 0.025;  // allowed where the surface holds it
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
 }
 
-TEST(Verdict, WhereOnlyTheEdgesHoldAPoseNearlyAllOfItMustBeFound) {
+TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
-  candidate.weakest_direction = 0.0, candidate.slip_lead = 150.0, candidate.explained_measurements = 1200.0;
+  candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.score = 0.8;  // enough where the surface holds it
+  candidate.without_rays = true;
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+  candidate.slip_lead = 150.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
+  const auto judged = [](const std::function<void(Candidate&)>& spoil) {
+    Candidate candidate = flawless();
+    spoil(candidate);
+    return decide({candidate}, block(), {});
+  };
+  EXPECT_TRUE(is_beyond_doubt(judged([](Candidate&) {}), {}));
+  const std::vector<std::function<void(Candidate&)>> flaws{
+      [](Candidate& c) { c.contradiction_share = 0.02; }, [](Candidate& c) { c.overrun_share = 0.15; },
+      [](Candidate& c) { c.weakest_direction = 0.004; },
+      [](Candidate& c) { c.residual_ratio = 0.3, c.normal_agreement = 0.8; }};
+  for (const auto& spoil : flaws) {
+    const Detection detection = judged(spoil);
+    EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+    EXPECT_FALSE(is_beyond_doubt(detection, {}));
+  }
+  EXPECT_FALSE(is_beyond_doubt(judged([](Candidate& c) { c.score = 0.3; }), {}));
 }
 
 TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {

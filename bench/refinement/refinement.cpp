@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// asbuilt_refinement: what bench/refinement/run calls. Each subcommand appends its trials, one JSON object a line.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <type_traits>
+
+#include "peer.h"
+#include "summary.h"
+#include "trial.h"
+
+namespace asbuilt::bench {
+namespace {
+
+struct Arguments {
+  std::filesystem::path out;
+  std::vector<std::string> folders, settings;
+  std::vector<int> scans{8, 128};
+  double angle = 0.0, shift = 0.0;
+  int seeds = 10, count = 40, scenes = 20, threads = 0;
+};
+
+Result<void> append(const Arguments& args, const std::vector<Trial>& trials) {
+  std::ofstream file(args.out / "trials.jsonl", std::ios::app);
+  for (const Trial& trial : trials) {
+    const nlohmann::ordered_json json{{"kind", trial.kind}, {"scene", trial.scene},     {"variant", trial.variant},
+                                      {"seed", trial.seed}, {"figures", trial.figures}, {"note", trial.note}};
+    file << json.dump() << "\n";
+    fmt::print(stderr, "{}\n", json.dump());
+  }
+  file.flush();
+  if (file) return {};
+  return fail(ErrorCode::unwritable_output, fmt::format("{}: cannot be written", (args.out / "trials.jsonl").string()));
+}
+
+template <class Trials>
+Result<void> for_each_folder(const Arguments& args, const Trials& trials_of) {
+  const Context context(args.threads);
+  for (const std::string& folder : args.folders) {
+    ASBUILT_TRY(scene, scene_of_folder(folder, context));
+    ASBUILT_TRY(trials, trials_of(scene, context));
+    ASBUILT_CHECK(append(args, trials));
+  }
+  return {};
+}
+
+Result<void> run_own(const Arguments& args) {
+  const Context context(args.threads);
+  for (int number = 0; number < args.scenes; ++number) {
+    ASBUILT_TRY(scene, own_scene(number, context));
+    ASBUILT_TRY(trials, start_trials(scene, 1, context));
+    for (Trial& trial : trials) trial.kind = "own";
+    ASBUILT_CHECK(append(args, trials));
+  }
+  return {};
+}
+
+Result<void> run_scale(const Arguments& args) {
+  ASBUILT_TRY(trials, scale_trials(args.scans, Context(args.threads)));
+  return append(args, trials);
+}
+
+Result<void> apply(refine::RefineOptions& options, const std::string& setting) {
+  const auto at = setting.find('=');
+  bool found = false;
+  for_each_field(options, [&](std::string_view field, auto& target, std::string_view) {
+    if (at == std::string::npos || field != setting.substr(0, at)) return;
+    using Value = std::remove_cvref_t<decltype(target)>;
+    const double value = std::stod(setting.substr(at + 1));
+    if constexpr (std::is_same_v<Value, bool>) {
+      target = value != 0.0;
+    } else {
+      target = static_cast<Value>(value);
+    }
+    found = true;
+  });
+  if (found) return {};
+  return fail(ErrorCode::invalid_argument, fmt::format("--set {}: expected NAME=NUMBER of a refine option", setting));
+}
+
+// One scene, one start, for development.
+Result<void> run_one(const Arguments& args) {
+  refine::RefineOptions options;
+  for (const std::string& setting : args.settings) ASBUILT_CHECK(apply(options, setting));
+  return for_each_folder(args, [&](const RefinementScene& scene, const Context& context) -> Result<std::vector<Trial>> {
+    const AccuracyJudge judge(scene);
+    ASBUILT_TRY(run, joint_run(scene, perturbed(scene, args.angle, args.shift, 0), options, context));
+    const Accuracy accuracy = judge.judge(run.poses, context, run.members);
+    fmt::print("{}: {} links, {} dropped, {} of {} together, {:.3f} sigma, ratio {:.4f}, {} iterations{}, {:.2f} s\n",
+               scene.name, run.links, run.dropped.size(), run.members.size(), scene.views.size(),
+               accuracy.relative_pose_error_sigma, accuracy.ratio_to_oracle(), run.iterations,
+               run.converged ? "" : " (not converged)", run.seconds);
+    std::fflush(stdout);
+    return std::vector<Trial>{};
+  });
+}
+
+int run(int argc, char** argv) {
+  Arguments args;
+  CLI::App app("The refinement suite (bench/README.md)");
+  app.require_subcommand(1);
+  app.add_option("--threads", args.threads, "0: all cores");
+  const auto with_out = [&](CLI::App* command) { command->add_option("out", args.out, "folder")->required(); };
+  const auto with_folders = [&](CLI::App* command) {
+    command->add_option("folders", args.folders, "folders with truth.json")->required();
+  };
+  CLI::App* starts = app.add_subcommand("starts", "from starts that are off");
+  CLI::App* ablation = app.add_subcommand("ablation", "each switch turned over");
+  CLI::App* wrong = app.add_subcommand("wrong", "one pose is wrong");
+  CLI::App* own = app.add_subcommand("own", "scenes of our own simulator");
+  CLI::App* scale = app.add_subcommand("scale", "many scans");
+  CLI::App* peer = app.add_subcommand("peer", "Open3D's multiway registration");
+  CLI::App* summary = app.add_subcommand("summary", "tables and pictures of what was run");
+  CLI::App* one = app.add_subcommand("one", "one start, printed");
+  for (CLI::App* command : {starts, ablation, wrong, own, scale, peer, summary}) with_out(command);
+  for (CLI::App* command : {starts, ablation, wrong, peer, one}) with_folders(command);
+  for (CLI::App* command : {starts, peer}) command->add_option("--seeds", args.seeds);
+  wrong->add_option("--count", args.count);
+  own->add_option("--scenes", args.scenes);
+  scale->add_option("--scans", args.scans);
+  one->add_option("--set", args.settings, "NAME=NUMBER");
+  one->add_option("--angle", args.angle);
+  one->add_option("--shift", args.shift);
+  CLI11_PARSE(app, argc, argv);
+
+  if (!args.out.empty()) std::filesystem::create_directories(args.out);
+  Result<void> done;
+  if (starts->parsed()) {
+    done = for_each_folder(
+        args, [&](const auto& scene, const auto& context) { return start_trials(scene, args.seeds, context); });
+  } else if (ablation->parsed()) {
+    done =
+        for_each_folder(args, [](const auto& scene, const auto& context) { return ablation_trials(scene, context); });
+  } else if (wrong->parsed()) {
+    done = for_each_folder(
+        args, [&](const auto& scene, const auto& context) { return wrong_trials(scene, args.count, context); });
+  } else if (peer->parsed()) {
+    done = for_each_folder(
+        args, [&](const auto& scene, const auto& context) { return peer_trials(scene, args.seeds, context); });
+  } else if (own->parsed()) {
+    done = run_own(args);
+  } else if (scale->parsed()) {
+    done = run_scale(args);
+  } else if (summary->parsed()) {
+    done = write_summary(args.out);
+  } else {
+    done = run_one(args);
+  }
+  if (done) return 0;
+  fmt::print(stderr, "asbuilt_refinement: {}\n", done.error().message);
+  return 1;
+}
+
+}  // namespace
+}  // namespace asbuilt::bench
+
+int main(int argc, char** argv) {
+  try {
+    return asbuilt::bench::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "asbuilt_refinement: {}\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "trial.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "asbuilt/core/random.h"
+#include "asbuilt/graph/pose_graph.h"
+#include "asbuilt/refine/link_evidence.h"
+#include "asbuilt/refine/suspicious_view.h"
+#include "asbuilt/simulate/parts.h"
+
+namespace asbuilt::bench {
+namespace {
+
+class Stopwatch {
+ public:
+  [[nodiscard]] double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
+std::vector<refine::View> chosen(const std::vector<refine::View>& views, const std::vector<int>& members) {
+  std::vector<refine::View> result;
+  for (const int member : members) result.push_back(views[static_cast<std::size_t>(member)]);
+  return result;
+}
+
+std::vector<Pose> poses_of(const std::vector<refine::View>& views) {
+  std::vector<Pose> poses;
+  for (const refine::View& view : views) poses.push_back(view.model_from_scan);
+  return poses;
+}
+
+// The links among `members` (indices into `left`), numbered by their place in `members`.
+std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::vector<int>& members) {
+  std::vector<int> place(static_cast<std::size_t>(*std::ranges::max_element(members)) + 1, -1);
+  for (std::size_t i = 0; i < members.size(); ++i) place[static_cast<std::size_t>(members[i])] = static_cast<int>(i);
+  const auto at = [&](int scan) {
+    return static_cast<std::size_t>(scan) < place.size() ? place[static_cast<std::size_t>(scan)] : -1;
+  };
+  std::vector<refine::Link> links;
+  for (const graph::PairOverlap& edge : graph.edges) {
+    if (at(edge.first) >= 0 && at(edge.second) >= 0) links.push_back({at(edge.first), at(edge.second)});
+  }
+  return links;
+}
+
+Result<int> contradicted(const std::vector<refine::View>& views, const std::vector<refine::Link>& links,
+                         const refine::Refinement& refinement, const Context& context) {
+  const auto count = static_cast<int>(views.size());
+  ASBUILT_TRY(evidence, refine::link_evidence(views, refinement.model_from_scan, links, context));
+  if (const auto found = refine::contradicted_view(count, evidence)) return found->view;
+  double floor_mm = 0.0;
+  for (const refine::View& view : views) floor_mm = std::max(floor_mm, view.noise_sigma_mm);
+  const auto suspicious = refine::suspicious_view(count, refinement.edges, floor_mm);
+  return suspicious ? suspicious->view : -1;
+}
+
+Trial trial_of(const char* kind, const RefinementScene& scene, std::string variant, std::uint64_t seed,
+               const JointRun& run) {
+  Trial trial{kind, scene.name, std::move(variant), seed, {}, {}};
+  trial.figures["views"] = static_cast<double>(scene.views.size());
+  trial.figures["points"] = static_cast<double>(scene.points());
+  trial.figures["links"] = static_cast<double>(run.links);
+  trial.figures["iterations"] = run.iterations;
+  trial.figures["converged"] = run.converged ? 1.0 : 0.0;
+  trial.figures["seconds"] = run.seconds;
+  trial.figures["dropped"] = static_cast<double>(run.dropped.size());
+  return trial;
+}
+
+// The part turned by half about an axis of its box, slid, or anywhere near where it is.
+Pose wrong_motion(const RefinementScene& scene, int kind, Random& random) {
+  const Eigen::Vector3d middle = scene.prepared.box.center();
+  Eigen::Vector3d direction(random.normal(), random.normal(), random.normal());
+  direction.normalize();
+  if (kind == 0) {
+    const Eigen::Vector3d axis = Eigen::Vector3d::Unit(static_cast<Eigen::Index>(random.below(3)));
+    return Eigen::Translation3d(middle) * Eigen::AngleAxisd(std::numbers::pi, axis) * Eigen::Translation3d(-middle);
+  }
+  if (kind == 1) return Pose(Eigen::Translation3d(random.uniform(0.02, 0.05) * scene.diameter_mm() * direction));
+  return Eigen::Translation3d(middle + 0.1 * scene.diameter_mm() * direction) *
+         Eigen::AngleAxisd(random.uniform(0.5, 3.0), direction) * Eigen::Translation3d(-middle);
+}
+
+}  // namespace
+
+Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::View> views,
+                           const refine::RefineOptions& options, const Context& context) {
+  const Stopwatch watch;
+  JointRun run;
+  run.poses = poses_of(views);
+  std::vector<int> left(views.size());
+  std::iota(left.begin(), left.end(), 0);
+  const std::vector<refine::View> start = views;
+  constexpr int kMostRounds = 3;
+  for (int round = 1;; ++round) {
+    const std::vector<refine::View> remaining = chosen(views, left);
+    std::vector<graph::PosedSegment> segments;
+    for (const refine::View& view : remaining) segments.push_back({view.segment_in_scan, view.model_from_scan});
+    ASBUILT_TRY(graph, graph::build_graph(segments, scene.prepared, {}, context));
+    const std::vector<int>& members = graph.components.front();
+    const std::vector<refine::View> together = chosen(remaining, members);
+    const std::vector<refine::Link> links = links_among(graph, members);
+    ASBUILT_TRY(refinement, refine::refine(together, links, options, context));
+    ASBUILT_TRY(suspect, contradicted(together, links, refinement, context));
+    if (suspect >= 0 && round > 1) {
+      const int at = members[static_cast<std::size_t>(suspect)];
+      run.dropped.push_back(left[static_cast<std::size_t>(at)]);
+      left.erase(left.begin() + at);
+      views = start;
+      round = 0;
+      continue;
+    }
+    run.members.clear();
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      const int view = left[static_cast<std::size_t>(members[i])];
+      run.members.push_back(view);
+      run.poses[static_cast<std::size_t>(view)] = refinement.model_from_scan[i];
+      views[static_cast<std::size_t>(view)].model_from_scan = refinement.model_from_scan[i];
+    }
+    const bool settled = run.links == links.size() && round > 1;
+    run.links = links.size();
+    run.iterations = refinement.iterations;
+    run.converged = refinement.converged;
+    run.seconds = watch.seconds();
+    if (settled || round == kMostRounds || options.paper_mode) return run;
+  }
+}
+
+Result<std::vector<Trial>> start_trials(const RefinementScene& scene, int seeds, const Context& context) {
+  const AccuracyJudge judge(scene);
+  std::vector<Trial> trials;
+  ASBUILT_TRY(reference, joint_run(scene, scene.views, {}, context));
+  const auto add = [&](std::string variant, int seed, const JointRun& run, bool with_surface) {
+    Trial trial = trial_of("start", scene, std::move(variant), static_cast<std::uint64_t>(seed), run);
+    trial.figures["error_sigma"] = judge.relative_pose_error(run.poses, run.members);
+    trial.figures["from_reference_sigma"] = judge.difference(run.poses, reference.poses, run.members);
+    if (with_surface) trial.figures["ratio"] = judge.judge(run.poses, context, run.members).ratio_to_oracle();
+    trials.push_back(std::move(trial));
+  };
+  add("0 deg 0 %", 0, reference, true);
+  for (const auto& [name, angle, shift] : {std::tuple("3 deg 3 %", 3.0, 0.03), std::tuple("6 deg 5 %", 6.0, 0.05)}) {
+    for (int seed = 0; seed < seeds; ++seed) {
+      ASBUILT_TRY(run, joint_run(scene, perturbed(scene, angle, shift, static_cast<std::uint64_t>(seed)), {}, context));
+      add(name, seed, run, seed == 0);
+    }
+  }
+  return trials;
+}
+
+Result<std::vector<Trial>> ablation_trials(const RefinementScene& scene, const Context& context) {
+  const AccuracyJudge judge(scene);
+  const auto start = perturbed(scene, 1.0, 0.01, 0);
+  std::vector<Trial> trials;
+  const auto add = [&](const std::string& name, const refine::RefineOptions& options) -> Result<void> {
+    ASBUILT_TRY(run, joint_run(scene, start, options, context));
+    Trial trial = trial_of("ablation", scene, name, 0, run);
+    trial.figures["error_sigma"] = judge.relative_pose_error(run.poses, run.members);
+    trials.push_back(std::move(trial));
+    return {};
+  };
+  ASBUILT_CHECK(add("default", {}));
+  std::vector<std::string> switches;
+  refine::RefineOptions named;
+  for_each_field(named, [&](std::string_view name, auto& value, std::string_view) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) switches.emplace_back(name);
+  });
+  for (const std::string& name : switches) {
+    refine::RefineOptions options;
+    bool now = false;
+    for_each_field(options, [&](std::string_view field, auto& value, std::string_view) {
+      if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) {
+        if (field == name) now = value = !value;
+      }
+    });
+    ASBUILT_CHECK(add(fmt::format("{} {}", name, now ? "on" : "off"), options));
+  }
+  ASBUILT_CHECK(add("paper", refine::RefineOptions{}.as_published()));
+  return trials;
+}
+
+Result<std::vector<Trial>> wrong_trials(const RefinementScene& scene, int count, const Context& context) {
+  constexpr const char* kKinds[] = {"flip", "slide", "anywhere"};
+  constexpr double kAsIfNeverThere = 0.1;  // sigma
+  const AccuracyJudge judge(scene);
+  std::vector<Trial> trials;
+  for (int i = 0; i < count; ++i) {
+    Random random(static_cast<std::uint64_t>(i), "wrong pose", 0);
+    const int kind = i % 4 == 3 ? 2 : i % 2;  // three quarters plausible
+    const auto wrong = random.below(scene.views.size());
+    auto views = perturbed(scene, 0.5, 0.005, static_cast<std::uint64_t>(i));
+    auto without = views;
+    without[wrong].segment_in_scan = {};
+    views[wrong].model_from_scan = wrong_motion(scene, kind, random) * scene.truth[wrong];
+    const double off_mm = [&] {
+      double largest = 0.0;
+      for (const Eigen::Vector3f& p : views[wrong].segment_in_scan.positions) {
+        const Eigen::Vector3d x = p.cast<double>();
+        largest = std::max(largest, (views[wrong].model_from_scan * x - scene.truth[wrong] * x).norm());
+      }
+      return largest;
+    }();
+    ASBUILT_TRY(run, joint_run(scene, views, {}, context));
+    Trial trial = trial_of("wrong", scene, kKinds[kind], static_cast<std::uint64_t>(i), run);
+    trial.figures["off_ratio"] = off_mm / scene.diameter_mm();
+    const bool found = std::ranges::find(run.dropped, static_cast<int>(wrong)) != run.dropped.end();
+    const bool separate = std::ranges::find(run.members, static_cast<int>(wrong)) == run.members.end();
+    trial.figures["found"] = found ? 1.0 : 0.0;
+    trial.figures["apart"] = separate ? 1.0 : 0.0;  // dropped, or left outside the largest component
+    trial.figures["others_dropped"] = static_cast<double>(run.dropped.size()) - (found ? 1.0 : 0.0);
+    trial.figures["error_sigma"] = judge.relative_pose_error(run.poses, run.members);
+    RefinementScene rest;
+    std::vector<int> others = run.members;
+    std::erase(others, static_cast<int>(wrong));
+    RefinementScene smaller;
+    smaller.prepared = scene.prepared;
+    std::vector<refine::View> rest_views;
+    for (const int other : others) rest_views.push_back(without[static_cast<std::size_t>(other)]);
+    ASBUILT_TRY(clean, joint_run(smaller, rest_views, {}, context));
+    std::vector<Pose> clean_poses = scene.truth;
+    for (std::size_t k = 0; k < others.size(); ++k) clean_poses[static_cast<std::size_t>(others[k])] = clean.poses[k];
+    trial.figures["rest_moved_sigma"] = judge.difference(run.poses, clean_poses, others);
+    // Refinement that brings the pose back where it belongs has mended it: then there is nothing to drop.
+    const bool mended = !separate && judge.relative_pose_error(run.poses, run.members) <
+                                         judge.relative_pose_error(clean_poses, others) + 0.25;
+    trial.figures["mended"] = mended ? 1.0 : 0.0;
+    trial.figures["rest_as_if_never_there"] = trial.figures["rest_moved_sigma"] < kAsIfNeverThere ? 1.0 : 0.0;
+    trial.note = fmt::format("{} {}", scene.names[wrong], kKinds[kind]);
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+Result<RefinementScene> own_scene(int number, const Context& context) {
+  struct OwnPart {
+    const char* name;
+    TriangleMesh mesh;
+  };
+  const auto part = [&]() -> OwnPart {
+    switch (number % 3) {
+      case 0:
+        return {"valve_body", simulate::valve_body()};
+      case 1:
+        return {"stepped_block", simulate::stepped_block()};
+      default:
+        return {"l_profile", simulate::l_profile(120.0, 80.0, 12.0, 300.0)};
+    }
+  }();
+  Random random(static_cast<std::uint64_t>(number), "own scene", 0);
+  simulate::SimulateOptions options;
+  options.scans = 8;
+  options.points = 60000;
+  options.seed = static_cast<std::uint64_t>(number) + 1;
+  options.pose = "any";
+  options.clutter_objects = 4;
+  options.noise_ratio = 0.0003 * std::pow(5.0, random.uniform());
+  // Warp and dents together make 0.2 to 1 % of the diameter.
+  const double deviation = random.uniform(0.002, 0.01);
+  options.as_built.warp_ratio = 0.6 * deviation;
+  options.as_built.bump_height_ratio = 0.4 * deviation;
+  options.as_built.dents = 2;
+  options.as_built.bosses = 1;
+  return simulated_scene(fmt::format("{}_{:02}", part.name, number), part.mesh, options, context);
+}
+
+Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Context& context) {
+  std::vector<Trial> trials;
+  const int most = *std::ranges::max_element(scans);
+  simulate::SimulateOptions options;
+  options.scans = most;
+  options.points = 12000;
+  options.clutter_objects = 0;
+  options.pose = "any";
+  ASBUILT_TRY(all, simulated_scene("valve_body", simulate::valve_body(), options, context));
+  for (const int count : scans) {
+    RefinementScene scene;
+    scene.name = all.name;
+    scene.noise_sigma_mm = all.noise_sigma_mm;
+    scene.as_built = all.as_built;
+    scene.prepared = all.prepared;
+    for (std::size_t v = 0; v < static_cast<std::size_t>(count) && v < all.views.size(); ++v) {
+      scene.views.push_back(all.views[v]);
+      scene.truth.push_back(all.truth[v]);
+      scene.names.push_back(all.names[v]);
+    }
+    ASBUILT_TRY(run, joint_run(scene, perturbed(scene, 1.0, 0.01, 0), {}, context));
+    Trial trial = trial_of("scale", scene, fmt::format("{} scans", count), 0, run);
+    trial.figures["error_sigma"] = AccuracyJudge(scene).relative_pose_error(run.poses, run.members);
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+}  // namespace asbuilt::bench

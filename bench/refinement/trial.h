@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "accuracy.h"
+#include "scene.h"
+
+namespace asbuilt::bench {
+
+/// One run of the suite and what came out. Lengths in units of the sensor's noise where the name says sigma.
+struct Trial {
+  std::string kind;  ///< "start", "own", "wrong", "scale", "ablation", "peer"
+  std::string scene, variant;
+  std::uint64_t seed = 0;
+  std::map<std::string, double> figures;
+  std::string note;
+};
+
+/// Poses of the views that stayed, the dropped ones, and the time of it all.
+struct JointRun {
+  std::vector<Pose> poses;   ///< one a view; those of dropped views are where they started
+  std::vector<int> members;  ///< views that were refined together: the largest component
+  std::vector<int> dropped;
+  std::size_t links = 0;
+  int iterations = 0;
+  bool converged = false;
+  double seconds = 0.0;  ///< graph and refinement, trees and normals included
+};
+
+/// Graph, refinement, and once more without a view that the others contradict, as `asbuilt register` does it.
+[[nodiscard]] Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::View> views,
+                                         const refine::RefineOptions& options, const Context& context);
+
+/// Starts that are off: where it ends, and how far from the run that starts at the true poses.
+[[nodiscard]] Result<std::vector<Trial>> start_trials(const RefinementScene& scene, int seeds, const Context& context);
+
+/// Each switch of the refinement turned over, from 1 degree and 1 % off.
+[[nodiscard]] Result<std::vector<Trial>> ablation_trials(const RefinementScene& scene, const Context& context);
+
+/// One view stands wrong: turned by half about an axis of the box, slid by 2 to 5 % of the diameter, or anywhere.
+[[nodiscard]] Result<std::vector<Trial>> wrong_trials(const RefinementScene& scene, int trials, const Context& context);
+
+/// A scene of our own simulator: part `number` with an as-built deviation of 0.2 to 1 % of the diameter.
+[[nodiscard]] Result<RefinementScene> own_scene(int number, const Context& context);
+
+/// Many scans of one part, from 1 degree and 1 % off: time against the number of scans.
+[[nodiscard]] Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Context& context);
+
+}  // namespace asbuilt::bench
