@@ -26,7 +26,7 @@ says short.las truncated
 if [ -d "$data/formats" ]; then
   one "$data/formats/bunnyDouble.e57" 30571 1
   one "$data/formats/bunnyInt21.e57" 30571 1
-  one "$data/formats/A_moved_B.e57" 4 2
+  one "$data/formats/A_moved_B.e57" 6 2  # its header counts 2 and 4
   one "$data/formats/ZeroPoints.e57" 0 1
   one "$data/formats/simple.las" 1065 1
   one "$data/formats/no-points.las" 0 1

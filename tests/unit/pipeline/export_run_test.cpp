@@ -38,7 +38,9 @@ class Export : public testing::Test {
     }
   }
 
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "export_run";
+  // One a test: they run at the same time.
+  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "export_run" /
+                                  testing::UnitTest::GetInstance()->current_test_info()->name();
   io::RunRecord record_;
 };
 
