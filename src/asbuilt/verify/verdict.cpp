@@ -98,6 +98,16 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                     "to something larger",
                     100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
   }
+  // Each share within its limit, but both near it: right poses reach at most 1.2 together.
+  constexpr double kMostTogether = 1.5;
+  if (!options.paper_mode &&
+      c.contradiction_share * options.max_overrun_share + c.overrun_share * options.max_contradiction_share >
+          kMostTogether * options.max_overrun_share * options.max_contradiction_share) {
+    return {Reason::contradicted,
+            fmt::format("the scan denies {:.1f} % of the claimed surface, and the surface goes on past {:.0f} % of the "
+                        "part's edges: each is allowed, but not both",
+                        100.0 * c.contradiction_share, 100.0 * c.overrun_share)};
+  }
   if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,
             fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "

@@ -139,6 +139,16 @@ TEST(Verdict, AsksForMoreProofWhereNoRayCanRefuteThePose) {
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
 }
 
+TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
+  Candidate candidate = flawless();
+  candidate.contradiction_share = 0.028;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.overrun_share = 0.15;
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
+  candidate.contradiction_share = 0.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
 TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
   Candidate candidate = flawless();
   candidate.score = 0.75, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.39
