@@ -24,6 +24,8 @@ configure_and_build() {
   options=$2
   shift 2
   say "Configuring build/$preset"
+  # Where ccache is installed, what was compiled before is not compiled again.
+  if command -v ccache >/dev/null; then export CMAKE_CXX_COMPILER_LAUNCHER="${CMAKE_CXX_COMPILER_LAUNCHER-ccache}"; fi
   # The options are a list of words.
   # shellcheck disable=SC2086
   cmake --preset "$preset" $options || die "CMake could not configure build/$preset; the reason stands above"

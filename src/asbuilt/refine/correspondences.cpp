@@ -60,8 +60,7 @@ std::uint32_t match_of(std::uint32_t source, std::uint32_t before, const Sampled
 
 float weight_of(std::uint32_t source, std::uint32_t target, const SampledView& from, const SampledView& to,
                 const Pose& to_from_from, const MatchRules& rules) {
-  const float variance = 0.5F * (from.variance[source] + to.variance[target]);
-  float weight = std::min(from.weight[source], to.weight[target]) / variance;
+  const float weight = std::min(from.weight[source], to.weight[target]);
   if (!rules.weigh_reach || !(to.fit_radius_mm > 0.0)) return weight;
   const Eigen::Vector3f offset =
       (to_from_from * from.points.positions[source].cast<double>() - to.points.positions[target].cast<double>())

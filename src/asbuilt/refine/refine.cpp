@@ -117,10 +117,10 @@ class JointRefinement {
 
   void sample(std::span<const View> views) {
     const SamplingRules rules{static_cast<std::size_t>(options_.points_per_scan), kCoarsePoints, options_.face_normals,
-                              options_.rim_weights, options_.incidence_weights};
+                              options_.rim_weights};
     views_.resize(views.size());
     parallel_for(context_, views.size(), 1, [&](std::size_t v) {
-      views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, views[v].viewpoint, rules, context_);
+      views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, rules, context_);
     });
   }
 
@@ -454,7 +454,7 @@ Result<void> RefineOptions::validate() const {
 RefineOptions RefineOptions::as_published() const {
   RefineOptions published = *this;
   published.paper_mode = true;
-  published.face_normals = published.rim_weights = published.incidence_weights = published.reach_weights = false;
+  published.face_normals = published.rim_weights = published.reach_weights = false;
   published.edge_weights = published.anneal = published.coarse_to_fine = published.keep_matches = false;
   published.drop_unheld = published.symmetric = false;
   return published;

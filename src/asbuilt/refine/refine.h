@@ -32,17 +32,16 @@ struct RefineOptions {
   double start_distance_ratio = 0.04;  ///< farthest correspondence of the first step / diameter of the views (ours)
   double converged_motion = 0.02;      ///< stop when no view moves by more than this, in units of the residual noise
   // What goes beyond the paper; paper mode turns all of it off. What each is worth: bench/README.md, docs/refine.md.
-  bool face_normals = true;       ///< normals fitted to the points of one face, not across edges
-  bool rim_weights = true;        ///< points at a scan's rim hardly count: they may be mixed, and the surface ends
-  bool incidence_weights = true;  ///< residuals count by the noise that the viewpoint lets one expect of them
-  bool reach_weights = true;      ///< a match counts less the further it reaches beyond the plane that was fitted
-  bool edge_weights = true;       ///< edges count by their variance
-  bool anneal = true;             ///< reach and robust scale shrink from the misalignment to the noise
-  bool coarse_to_fine = true;     ///< a thinned sample until no view moves by more than half the noise
-  bool keep_matches = true;       ///< correspondences are searched again only where views have moved
-  bool drop_unheld = true;        ///< a link says nothing about directions that it does not hold
-  bool symmetric = false;         ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
-  bool paper_mode = false;        ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
+  bool face_normals = true;    ///< normals fitted to the points of one face, not across edges
+  bool rim_weights = true;     ///< points at a scan's rim hardly count: they may be mixed, and the surface ends
+  bool reach_weights = true;   ///< a match counts less the further it reaches beyond the plane that was fitted
+  bool edge_weights = true;    ///< edges count by their variance
+  bool anneal = true;          ///< reach and robust scale shrink from the misalignment to the noise
+  bool coarse_to_fine = true;  ///< a thinned sample until no view moves by more than half the noise
+  bool keep_matches = true;    ///< correspondences are searched again only where views have moved
+  bool drop_unheld = true;     ///< a link says nothing about directions that it does not hold
+  bool symmetric = false;      ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
+  bool paper_mode = false;     ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
 
   [[nodiscard]] Result<void> validate() const;
   [[nodiscard]] RefineOptions as_published() const;  ///< paper mode, and everything beyond the paper off
@@ -59,7 +58,6 @@ void for_each_field(RefineOptions& options, Visitor&& field) {
   field("converged_motion", options.converged_motion, "motion below which it stops, in units of the residual noise");
   field("face_normals", options.face_normals, "normals fitted to the points of one face, not across edges");
   field("rim_weights", options.rim_weights, "points at the rim of a scan hardly count");
-  field("incidence_weights", options.incidence_weights, "residuals count by the noise expected at their incidence");
   field("reach_weights", options.reach_weights, "a match counts less beyond the plane that was fitted");
   field("edge_weights", options.edge_weights, "links count by the variance of their residuals");
   field("anneal", options.anneal, "reach and robust scale shrink from the misalignment to the noise");

@@ -9,7 +9,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
-#include "asbuilt/refine/local_planes.h"
+#include "asbuilt/scan/face_normals.h"
 #include "asbuilt/scan/normals.h"
 
 namespace asbuilt::refine {
@@ -116,18 +116,6 @@ std::vector<float> rim_weights(const SampledView& view, double scan_spacing_mm, 
   return weights;
 }
 
-// Noise acts along the ray, and a small share of it across: of a surface seen at a slant less of it is felt.
-std::vector<float> incidence_variances(const PointCloud& points, const scan::Viewpoint& viewpoint) {
-  constexpr double kAcross = 0.1;  // variance across the ray, and whatever else does not depend on incidence
-  std::vector<float> variances(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d ray = viewpoint.towards_sensor(points.positions[i].cast<double>());
-    const double cosine = ray.dot(points.normals[i].cast<double>());
-    variances[i] = static_cast<float>(kAcross + (1.0 - kAcross) * cosine * cosine);
-  }
-  return variances;
-}
-
 }  // namespace
 
 PointCloud evenly_sampled(const PointCloud& cloud, std::size_t count, const Context& context) {
@@ -152,8 +140,8 @@ std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double
   return places;
 }
 
-SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const scan::Viewpoint& viewpoint,
-                         const SamplingRules& rules, const Context& context) {
+SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const SamplingRules& rules,
+                         const Context& context) {
   SampledView view;
   view.points = evenly_sampled(segment, rules.points, context);
   view.coarse = even_indices(view.points.positions, rules.coarse_points, context);
@@ -163,14 +151,12 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
   const auto fitted = static_cast<double>(scan::neighbours_for_normals(noise_sigma_mm, view.spacing_mm));
   view.fit_radius_mm = std::sqrt(fitted / std::numbers::pi) * view.spacing_mm;
   if (rules.face_normals) {
-    view.points.normals = face_normals(view.points, *view.tree, noise_sigma_mm, view.spacing_mm, context);
+    view.points.normals = scan::face_normals(view.points, *view.tree, noise_sigma_mm, view.spacing_mm, context);
   }
   view.weight.assign(view.points.size(), 1.0F);
-  view.variance.assign(view.points.size(), 1.0F);
   if (rules.rim_weights && view.spacing_mm > 0.0) {
     view.weight = rim_weights(view, median_spacing(segment.positions), context);
   }
-  if (rules.incidence_weights && viewpoint.known()) view.variance = incidence_variances(view.points, viewpoint);
   for (const Eigen::Vector3f& point : view.points.positions) view.centroid += point.cast<double>();
   const auto count = static_cast<double>(view.points.size());
   view.centroid /= count;

@@ -8,7 +8,6 @@
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
-#include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::refine {
 
@@ -25,9 +24,8 @@ enum class Place : char { inside, edge, rim };
 /// How views are sampled and what their points count.
 struct SamplingRules {
   std::size_t points = 25000, coarse_points = 2500;
-  bool face_normals = true;       ///< normals fitted anew, to the points of one face only
-  bool rim_weights = true;        ///< what may be mixed with something behind it hardly counts
-  bool incidence_weights = true;  ///< where the viewpoint is known: a range errs along the ray
+  bool face_normals = true;  ///< normals fitted anew, to the points of one face only
+  bool rim_weights = true;   ///< what may be mixed with something behind it hardly counts
 };
 
 /// A view as the refinement works with it, in its own scan frame.
@@ -35,7 +33,6 @@ struct SampledView {
   PointCloud points;                  ///< 20-30 k evenly spread points
   std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
   std::vector<float> weight;          ///< of each point, in (0, 1]
-  std::vector<float> variance;        ///< of each point along its normal, relative to one measured straight on
   double spacing_mm = 0.0;
   double fit_radius_mm = 0.0;  ///< how far the plane at a point has been fitted
   double noise_sigma_mm = 0.0;
@@ -44,8 +41,7 @@ struct SampledView {
   std::unique_ptr<const KdTree> tree;
 };
 
-[[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm,
-                                       const scan::Viewpoint& viewpoint, const SamplingRules& rules,
+[[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const SamplingRules& rules,
                                        const Context& context);
 
 }  // namespace asbuilt::refine

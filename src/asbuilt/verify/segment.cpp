@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/segment.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/verify/flying_points.h"
 
 namespace asbuilt::verify {
 namespace {
@@ -16,6 +18,7 @@ enum class Kind : std::uint8_t { certain, departing, beyond };
 struct Candidate {
   std::uint32_t index;
   Kind kind;
+  float deviation_mm = 0.0F;  ///< from the CAD, signed
 };
 
 // Points around the model, told apart by their distance to the CAD and their normal. `beyond` is one more reach wide:
@@ -33,7 +36,7 @@ std::vector<Candidate> candidates(const Pose& model_from_scan, const model::Prep
     const std::uint32_t index = around[i].index;
     const Eigen::Vector3d point = model_from_scan * scan.cloud.positions[index].cast<double>();
     const auto nearest = model.surface->nearest(point, 2.0 * options.reach_mm);
-    found[i] = {nearest.found() ? index : kOutside, Kind::beyond};
+    found[i] = {nearest.found() ? index : kOutside, Kind::beyond, static_cast<float>(nearest.signed_distance)};
     if (!nearest.found() || background[index] != 0) return;
     const Eigen::Vector3d model_normal = model.face_normals[nearest.triangle].cast<double>();
     const double cosine = model_normal.dot(model_from_scan.linear() * scan.cloud.normals[index].cast<double>());
@@ -98,6 +101,16 @@ Surfaces connected_surfaces(const std::vector<Candidate>& all, const scan::Scan&
   return result;
 }
 
+// Beams that met two surfaces at once measured neither: they go to the margin.
+void set_flying_aside(Segment& segment, std::span<const float> deviation_mm, const scan::Scan& scan,
+                      const Context& context) {
+  const std::vector<std::uint8_t> flying = flying_points(segment.part, deviation_mm, scan, context);
+  std::vector<std::uint32_t> kept;
+  for (std::size_t i = 0; i < flying.size(); ++i) (flying[i] != 0 ? segment.margin : kept).push_back(segment.part[i]);
+  segment.part = std::move(kept);
+  std::ranges::sort(segment.margin);
+}
+
 }  // namespace
 
 Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan,
@@ -107,6 +120,7 @@ Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& mo
   const std::vector<Candidate> all = candidates(model_from_scan, model, scan, background, tree, options, context);
   Surfaces surfaces = connected_surfaces(all, scan, tree, context);
   Segment segment;
+  std::vector<float> deviation_mm;  // of the part
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].kind == Kind::beyond) continue;
     const auto root = static_cast<std::size_t>(surfaces.pieces.find(static_cast<int>(i)));
@@ -114,7 +128,9 @@ Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& mo
     const bool ends_within = 20 * surfaces.beyond_members[root] <= surfaces.members[root];
     const bool belongs = all[i].kind == Kind::certain || (ends_within && surfaces.certain_contacts[root] > 0);
     (belongs ? segment.part : segment.margin).push_back(all[i].index);
+    if (belongs) deviation_mm.push_back(all[i].deviation_mm);
   }
+  set_flying_aside(segment, deviation_mm, scan, context);
   return segment;
 }
 

@@ -109,7 +109,7 @@ SmallProblem small_problem(double loss_scale) {
       cloud.positions.push_back(random_point(random).cast<float>());
       cloud.normals.push_back(test::random_direction(random).cast<float>());
     }
-    problem.views.push_back(sampled_view(cloud, 0.0, {}, {1000, 1000, false, false, false}, Context(1)));
+    problem.views.push_back(sampled_view(cloud, 0.0, {1000, 1000, false, false}, Context(1)));
     problem.poses.push_back(test::random_pose(random, 1.0, 10.0));
   }
   DirectedEdge edge;

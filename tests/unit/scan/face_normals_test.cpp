@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "asbuilt/refine/local_planes.h"
+#include "asbuilt/scan/face_normals.h"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +9,7 @@
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/scan/normals.h"
 
-namespace asbuilt::refine {
+namespace asbuilt::scan {
 namespace {
 
 // Three points across each face of a square bar along x: a thin profile as a distant scanner sees it. `across` tells
@@ -83,4 +83,4 @@ TEST(FaceNormals, OfHardlyAnyPointsAreThoseGiven) {
 }
 
 }  // namespace
-}  // namespace asbuilt::refine
+}  // namespace asbuilt::scan

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
 
-namespace asbuilt::refine {
+namespace asbuilt::scan {
 
 /// The normal, at each point, of the one face that the point lies on; unit length, turned as those of the cloud.
 ///
@@ -19,4 +21,9 @@ namespace asbuilt::refine {
                                                         double noise_sigma_mm, double spacing_mm,
                                                         const Context& context);
 
-}  // namespace asbuilt::refine
+/// The same at the points `at` alone, in their order.
+[[nodiscard]] std::vector<Eigen::Vector3f> face_normals_at(std::span<const std::uint32_t> at, const PointCloud& cloud,
+                                                           const KdTree& tree, double noise_sigma_mm, double spacing_mm,
+                                                           const Context& context);
+
+}  // namespace asbuilt::scan

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "asbuilt/refine/local_planes.h"
+#include "asbuilt/scan/face_normals.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/scan/normals.h"
 
-namespace asbuilt::refine {
+namespace asbuilt::scan {
 namespace {
 
 constexpr int kRefits = 3;
@@ -92,30 +93,40 @@ Eigen::Vector3f refitted(const Neighbourhood& around, const Eigen::Vector3f& sta
 
 }  // namespace
 
-std::vector<Eigen::Vector3f> face_normals(const PointCloud& cloud, const KdTree& tree, double noise_sigma_mm,
-                                          double spacing_mm, const Context& context) {
-  std::vector<Eigen::Vector3f> normals = cloud.normals;
+std::vector<Eigen::Vector3f> face_normals_at(std::span<const std::uint32_t> at, const PointCloud& cloud,
+                                             const KdTree& tree, double noise_sigma_mm, double spacing_mm,
+                                             const Context& context) {
+  std::vector<Eigen::Vector3f> normals(at.size());
+  for (std::size_t i = 0; i < at.size(); ++i) normals[i] = cloud.normals[at[i]];
   if (!(spacing_mm > 0.0)) return normals;
   const double noise = std::max(noise_sigma_mm, 1e-3 * spacing_mm);
-  const std::size_t count = scan::neighbours_for_normals(noise, spacing_mm) + 1;  // and the point itself
+  const std::size_t count = neighbours_for_normals(noise, spacing_mm) + 1;  // and the point itself
   const auto limit = static_cast<float>(kLimitInSigmas * noise);
-  parallel_for_blocks(context, cloud.size(), 256, [&](std::size_t begin, std::size_t end) {
+  parallel_for_blocks(context, at.size(), 256, [&](std::size_t begin, std::size_t end) {
     std::vector<KdTree::Neighbour> neighbours;
     Neighbourhood around;
     for (std::size_t i = begin; i < end; ++i) {
-      tree.nearest(cloud.positions[i], count, neighbours);
+      const Eigen::Vector3f& centre = cloud.positions[at[i]];
+      tree.nearest(centre, count, neighbours);
       around.offsets.clear();
       around.normals.clear();
       for (const KdTree::Neighbour& neighbour : neighbours) {
-        if (neighbour.index == i) continue;
-        around.offsets.push_back(cloud.positions[neighbour.index] - cloud.positions[i]);
+        if (neighbour.index == at[i]) continue;
+        around.offsets.push_back(cloud.positions[neighbour.index] - centre);
         around.normals.push_back(cloud.normals[neighbour.index]);
       }
       if (around.offsets.size() < 3) continue;
-      normals[i] = refitted(around, best_proposal(around, cloud.normals[i], limit), limit);
+      normals[i] = refitted(around, best_proposal(around, normals[i], limit), limit);
     }
   });
   return normals;
 }
 
-}  // namespace asbuilt::refine
+std::vector<Eigen::Vector3f> face_normals(const PointCloud& cloud, const KdTree& tree, double noise_sigma_mm,
+                                          double spacing_mm, const Context& context) {
+  std::vector<std::uint32_t> all(cloud.size());
+  std::iota(all.begin(), all.end(), 0U);
+  return face_normals_at(all, cloud, tree, noise_sigma_mm, spacing_mm, context);
+}
+
+}  // namespace asbuilt::scan
