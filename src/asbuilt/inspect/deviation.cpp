@@ -193,7 +193,6 @@ class Inspection {
     report_.far_points = feet.deviation_mm.size() - counted.size();
     report_.over_points = statistics_of_many(std::move(counted), std::nullopt);
     tolerances.write_to(report_.over_points);
-    report_.spacing_mm = median_spacing(measurement_.cloud.positions);
   }
 
   void compare_with_reference(const Feet& feet) {
@@ -213,6 +212,7 @@ class Inspection {
     report_.finder = std::make_shared<const SpotFinder>(measurement_, report_.alignment.model_from_given, feet, model_,
                                                         spacing_, max_distance());
     report_.noise_sigma_mm = report_.finder->noise_sigma_mm();
+    report_.spacing_mm = report_.finder->spacing_mm();
     report_.spots = report_.finder->at(model_.dense_samples, context_);
     report_.face_of_spot = faces_of_spots(model_, report_.face_map, context_);
     context_.report_progress(0.9);

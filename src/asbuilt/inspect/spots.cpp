@@ -9,18 +9,20 @@
 
 #include "asbuilt/core/cube_rows.h"
 #include "asbuilt/core/parallel.h"
-#include "asbuilt/core/voxel_grid.h"
 
 namespace asbuilt::inspect {
 namespace {
 
 constexpr float kSameSideCosine = 0.5F;  // foot and place lie on faces turned by less than 60 degrees
 constexpr std::size_t kAround = 6;       // points that tell the spacing about a place
-constexpr double kOwnReach = 0.5;        // in spacings: what a point stands for
-constexpr double kInnerReach = 1.1;   // in spacings, among points on all sides: no hole of a scattered cloud is wider
-constexpr double kMeanReach = 1.5;    // in spacings: the mean takes in the next neighbours at least
-constexpr double kPriorWeight = 8.0;  // points' worth of belief in the cloud's overall noise
-constexpr double kOutlier = 3.5;      // in noise sigmas, from the median
+constexpr double kOwnReach = 0.6;    // in spacings: discs about the points of a rim then reach half of one beyond it
+constexpr double kInnerReach = 1.1;  // in spacings, among points on all sides: no hole of a scattered cloud is wider
+constexpr double kHalfDisc = 0.75;   // half a disc, and what the square of the spacing misses of it at a rim
+constexpr double kMeanReach = 1.5;   // in spacings: the mean takes in the next neighbours at least
+constexpr double kOwnRadius = 0.75;  // of the radius that is asked for: neighbouring spots just overlap
+constexpr double kDetailSpacings = 5.0;  // radius of some 80 points
+constexpr double kPriorWeight = 8.0;     // points' worth of belief in the cloud's overall noise
+constexpr double kOutlier = 3.5;         // in noise sigmas, from the median
 
 /// What one point says, in the order of the grid.
 struct Witness {
@@ -76,8 +78,7 @@ struct SpotFinder::Implementation {
       chosen.push_back(i);
       feet.push_back(all.points[i]);
     }
-    spacing = median_spacing(feet);
-    cubes = std::make_unique<CubeRows>(feet, std::max(radius, 1e-6 * model.diameter));
+    cubes = std::make_unique<CubeRows>(feet, std::max(0.5 * radius, 1e-6 * model.diameter));
     witnesses.reserve(chosen.size());
     for (const std::uint32_t place : cubes->order()) {
       const std::uint32_t i = chosen[place];
@@ -88,6 +89,7 @@ struct SpotFinder::Implementation {
       witnesses.push_back(w);
     }
     feet = {};
+    spacing = median_distance(model.diameter);
     noise = overall_noise();
   }
 
@@ -104,6 +106,27 @@ struct SpotFinder::Implementation {
         }
       }
     });
+  }
+
+  /// Median distance of a point to its nearest neighbour, without a tree over all of them.
+  [[nodiscard]] double median_distance(double diameter) const {
+    constexpr std::size_t kProbes = 1000;
+    std::vector<double> distances;
+    const std::size_t probes = std::min(kProbes, witnesses.size());
+    for (std::size_t probe = 0; probe < probes; ++probe) {
+      const std::size_t place = probe * witnesses.size() / probes;
+      float squared = std::numeric_limits<float>::infinity();
+      for (double reach = 0.25 * radius; reach < diameter; reach *= 4.0) {
+        cubes->around(witnesses[place].foot, static_cast<float>(reach), [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) {
+            if (i != place) squared = std::min(squared, (witnesses[i].foot - witnesses[place].foot).squaredNorm());
+          }
+        });
+        if (static_cast<double>(squared) <= reach * reach) break;  // what lies beyond is further
+      }
+      if (std::isfinite(squared)) distances.push_back(std::sqrt(static_cast<double>(squared)));
+    }
+    return distances.empty() ? 0.0 : median_of(distances);
   }
 
   /// The scatter of points about a plane through their neighbours, over evenly chosen probes.
@@ -160,12 +183,15 @@ struct SpotFinder::Implementation {
     return widest < std::numbers::pi;
   }
 
-  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, Scratch& scratch) const {
+  /// `own_radius`: points so near belong to the place whatever their spacing.
+  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double own_radius,
+                        Scratch& scratch) const {
     std::vector<Near>& near = scratch.near;
-    double reach = std::max(0.75 * radius, 1.5 * spacing);
-    for (int widening = 0; widening < 3; ++widening, reach *= 2.0) {
+    double reach = std::max(own_radius, 1.5 * spacing);
+    gather(position, normal, reach, near);
+    while (near.size() < kAround && 2.0 * reach < 8.0 * radius) {
+      reach *= 2.0;
       gather(position, normal, reach, near);
-      if (near.size() >= kAround) break;
     }
     if (near.size() < 3) return {};
     const std::size_t last = std::min(kAround, near.size()) - 1;
@@ -178,14 +204,17 @@ struct SpotFinder::Implementation {
         std::sqrt(std::min_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(last) + 1, by_distance)
                       ->squared_distance);
     const bool surrounded = is_surrounded(position, normal, scratch, 4.0F * squared_around);
-    // The area that the nearest points share, half of it when they lie to one side.
-    const double area = (surrounded ? 1.0 : 0.5) * std::numbers::pi * static_cast<double>(squared_around);
+    // The area that the nearest points share; somewhat more than half of it when they lie to one side, as the disc then
+    // reaches past them.
+    const double area = (surrounded ? 1.0 : kHalfDisc) * std::numbers::pi * static_cast<double>(squared_around);
     const double local = std::min(std::sqrt(area / static_cast<double>(last + 1)), 4.0 * std::max(spacing, 1e-12));
     if (static_cast<double>(nearest) > (surrounded ? kInnerReach : kOwnReach) * local) return {};
-    const auto mean_reach = static_cast<float>(std::max(0.75 * radius, kMeanReach * local));
+    const auto mean_reach = static_cast<float>(std::max(own_radius, kMeanReach * local));
     std::erase_if(near, [&](const Near& n) { return n.squared_distance > mean_reach * mean_reach; });
     return near.empty() ? Spot{} : averaged(position, normal, scratch);
   }
+
+  [[nodiscard]] std::vector<Spot> all_at(const PointCloud& places, double own_radius, const Context& context) const;
 
   [[nodiscard]] Spot averaged(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, Scratch& scratch) const {
     scratch.values.clear();
@@ -266,13 +295,25 @@ SpotFinder& SpotFinder::operator=(SpotFinder&&) noexcept = default;
 
 double SpotFinder::noise_sigma_mm() const { return implementation_->noise; }
 
+double SpotFinder::spacing_mm() const { return implementation_->spacing; }
+
 std::vector<Spot> SpotFinder::at(const PointCloud& places, const Context& context) const {
+  return implementation_->all_at(places, kOwnRadius * implementation_->radius, context);
+}
+
+std::vector<Spot> SpotFinder::detailed_at(const PointCloud& places, const Context& context) const {
+  const double radius = std::min(kOwnRadius * implementation_->radius, kDetailSpacings * implementation_->spacing);
+  return implementation_->all_at(places, radius, context);
+}
+
+std::vector<Spot> SpotFinder::Implementation::all_at(const PointCloud& places, double own_radius,
+                                                     const Context& context) const {
   std::vector<Spot> spots(places.size());
   parallel_for_blocks(context, places.size(), 256, [&](std::size_t begin, std::size_t end) {
     if (context.cancelled()) return;
     Scratch scratch;
     for (std::size_t i = begin; i < end; ++i) {
-      spots[i] = implementation_->at(places.positions[i], places.normals[i], scratch);
+      spots[i] = at(places.positions[i], places.normals[i], own_radius, scratch);
     }
   });
   return spots;

@@ -52,6 +52,8 @@ class SpotFinder {
   /// about it without outliers. Its standard error: from their scatter and the stated noise, their number, and how well
   /// their scans' poses are known.
   [[nodiscard]] std::vector<Spot> at(const PointCloud& places, const Context& context) const;
+  /// The same for pictures: from the nearest few dozen points only where there are many, so sharper and sooner there.
+  [[nodiscard]] std::vector<Spot> detailed_at(const PointCloud& places, const Context& context) const;
 
   /// The extremum (towards `sign`) of a paraboloid fitted to the points within `reach_mm` of a place: a mean over the
   /// neighbourhood would level a narrow dent. Falls back on the spot where there are too few points.
@@ -59,6 +61,7 @@ class SpotFinder {
                                double reach_mm, const Spot& spot) const;
 
   [[nodiscard]] double noise_sigma_mm() const;  ///< of single points, robust, from their scatter; 0: unknown
+  [[nodiscard]] double spacing_mm() const;      ///< of the points, median; 0: fewer than two
 
  private:
   struct Implementation;

@@ -93,7 +93,7 @@ Scene scene_of(const model::PreparedModel& model, const inspect::DeviationReport
   PointCloud vertices;
   for (const Eigen::Vector3d& vertex : scene.mesh.vertices) vertices.positions.push_back(vertex.cast<float>());
   vertices.normals = scene.mesh.normals;
-  scene.spots = deviations.finder->at(vertices, context);
+  scene.spots = deviations.finder->detailed_at(vertices, context);
   scene.region = regions_of(vertices, model, deviations, context);
   return scene;
 }

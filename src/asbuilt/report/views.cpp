@@ -192,7 +192,7 @@ void draw_edges(Canvas& canvas, const Scene& scene, const Projection& projection
 }
 
 std::string signed_number(double value, double range) {
-  const int digits = std::clamp(2 - static_cast<int>(std::floor(std::log10(range))), 0, 6);
+  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(range))), 0, 6);
   const std::string text = fmt::format("{:.{}f}", std::abs(value), digits);
   const bool is_zero = text.find_first_of("123456789") == std::string::npos;
   return (is_zero ? "" : value < 0.0 ? "\u2212" : "+") + text;
@@ -213,7 +213,7 @@ void draw_legend(Image& image, const ColourMap& colours, bool steps) {
   if (tolerance) {
     for (const double end : {tolerance->low_mm, tolerance->high_mm}) {
       if (std::abs(end) >= range) continue;
-      std::erase_if(ticks, [&](double tick) { return tick != end && std::abs(tick - end) < 0.12 * range; });
+      std::erase_if(ticks, [&](double tick) { return tick != end && std::abs(tick - end) < 0.16 * range; });
       if (std::ranges::find(ticks, end) == ticks.end()) ticks.push_back(end);
     }
   }
