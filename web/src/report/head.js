@@ -18,13 +18,11 @@ export function head(report) {
   return h('header', { class: 'head' },
     h('div', { class: 'title' },
       h('p', { class: 'soft' }, 'Inspection report'),
-      h('h1', null, file_name(report.model.path))),
+      h('h1', null, file_name(report.model.path)), report.summary && h('p', { class: 'summary' }, report.summary)),
     h('div', { class: `verdict ${verdict_class(verdict.part)}` },
       verdict_icon(verdict.part), h('div', null, h('strong', { id: 'verdict' }, word), verdict.reason && h('p', null, verdict.reason))),
     h('dl', { class: 'figures' }, figures(report, area, coverage, decimals)),
-    h('div', { class: 'said' },
-      report.summary && h('p', { class: 'summary' }, report.summary),
-      notes(report)));
+    notes(report));
 }
 
 function figures(report, area, coverage, decimals) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The interactive view: what the part is coloured by, its legend, picking, and flying to regions and faces.
 import { Vector3 } from 'three';
-import { css_colour, category_colour } from '../shared/colours.js';
-import { h, make_button } from '../shared/dom.js';
-import { kNone, number, percent, place, signed, signed_mm } from '../shared/format.js';
+import { category_colour } from '../shared/colours.js';
+import { h } from '../shared/dom.js';
+import { kNone, number, place, signed, signed_mm } from '../shared/format.js';
 import { Sensors } from '../shared/sensors.js';
 import { corner_at, value_at } from '../shared/surface.js';
 import { verdict_badge } from '../shared/verdict.js';
@@ -111,12 +111,12 @@ export class ReportView {
       this.sensors = new Sensors(this.viewer, this.host);
       const name = (index) => this.report.scans[index]?.name ?? `scan ${index}`;
       const sensors = this.scene.poses.filter((pose) => pose.viewpoint).map((pose) => ({
-        id: pose.scan, position: pose.viewpoint, colour: css_colour(category_colour(pose.scan)), label: String(pose.scan), title: name(pose.scan) }));
-      const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, colour: css_colour([150, 160, 172]) }));
+        id: pose.scan, position: pose.viewpoint, colour: category_colour(pose.scan), label: String(pose.scan), title: name(pose.scan) }));
+      const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, colour: [120, 132, 146] }));
       this.sensors.set(sensors, links);
     }
     this.sensors.visible = on;
-    this.viewer.extent = on ? this.sensors.extent() : null;
+    this.viewer.others = on ? this.sensors.places() : [];
     this.viewer.show_all();
   }
 

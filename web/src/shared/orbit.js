@@ -41,11 +41,25 @@ export class Orbit {
     this.camera.updateMatrixWorld();
   }
 
-  /** The distance from which a sphere fills the view. */
+  /** The distance from the target at which a sphere fills the view. */
   fitting_distance(radius) {
     const half = MathUtils.degToRad(this.camera.fov) / 2;
     const narrow = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
     return (1.04 * radius) / Math.sin(narrow);
+  }
+
+  /** The distance from `target`, looking from the present direction, at which all points are in view. */
+  distance_for(points, target) {
+    const out = this.direction;
+    const right = new Vector3(-Math.sin(this.azimuth), Math.cos(this.azimuth), 0);
+    const up = new Vector3().crossVectors(out, right);
+    const tangent = Math.tan(MathUtils.degToRad(this.camera.fov) / 2);
+    const offset = new Vector3();
+    return points.reduce((most, point) => {
+      offset.subVectors(point, target);
+      const aside = Math.max(Math.abs(offset.dot(right)) / (tangent * this.camera.aspect), Math.abs(offset.dot(up)) / tangent);
+      return Math.max(most, offset.dot(out) + 1.1 * aside);
+    }, 0);
   }
 
   look_along(direction) {

@@ -2,11 +2,14 @@
 // Sensors round the part: one instanced pyramid each, links as lines between them, labels as HTML above the canvas.
 import {
   BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, InstancedMesh, LineBasicMaterial, LineSegments,
-  Matrix4, MeshBasicMaterial, Quaternion, Vector3,
+  Matrix4, MeshBasicMaterial, Quaternion, SRGBColorSpace, Vector3,
 } from 'three';
+import { css_colour } from './colours.js';
 
 /** Further than this from the part's middle, in diameters, sensors are drawn nearer: else the part would be a dot. */
-const kFarthest = 1.5;
+const kFarthest = 0.95;
+
+const shade_of = ([r, g, b]) => new Color().setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);
 
 /** A pyramid with its tip in the origin that opens along +z: the sensor and what it looks at. */
 function pyramid_geometry() {
@@ -44,7 +47,7 @@ export class Sensors {
     return middle.add(offset);
   }
 
-  /** sensors: [{id, position, direction | null, colour: css, label, title, ghost, kind}]; links: [{from: id, to: id, colour}]. */
+  /** sensors: [{id, position, direction | null, colour: rgb, label, title, ghost, kind}]; links: [{from: id, to: id, colour}]. */
   set(sensors, links) {
     const { diameter, centre } = this.viewer.surface.box;
     this.#reserve(sensors.length);
@@ -56,7 +59,7 @@ export class Sensors {
       const turn = new Quaternion().setFromUnitVectors(forward, direction.normalize());
       const scale = size * (sensor.ghost ? 1.5 : 1);
       this.mesh.setMatrixAt(i, new Matrix4().compose(sensor.at, turn, new Vector3(scale, scale, scale)));
-      this.mesh.setColorAt(i, new Color(sensor.colour));
+      this.mesh.setColorAt(i, shade_of(sensor.colour));
     });
     if (this.mesh) {
       this.mesh.count = sensors.length;
@@ -68,12 +71,9 @@ export class Sensors {
     this.viewer.request();
   }
 
-  /** The sphere round the part and all sensors. */
-  extent() {
-    const { centre, diameter } = this.viewer.surface.box;
-    const middle = new Vector3(...centre);
-    const reach = (this.shown ?? []).map((sensor) => sensor.at.distanceTo(middle) * 1.06);
-    return { centre: middle, radius: Math.max(diameter / 2, ...reach) };
+  /** Where all sensors are drawn: what a view of the whole must hold beside the part. */
+  places() {
+    return (this.shown ?? []).map((sensor) => sensor.at);
   }
 
   set visible(on) {
@@ -116,12 +116,12 @@ export class Sensors {
       colours.setXYZ(i++, colour.r, colour.g, colour.b);
     };
     for (const { from, to, colour } of pairs) {
-      const shade = new Color(colour);
+      const shade = shade_of(colour);
       put(by_id.get(from).at, shade);
       put(by_id.get(to).at, shade);
     }
     for (const sensor of rays) {
-      const shade = new Color(sensor.colour);
+      const shade = shade_of(sensor.colour);
       put(sensor.at, shade);
       put(new Vector3(...sensor.target), shade);
     }
@@ -149,7 +149,7 @@ export class Sensors {
       if (label.className !== kind) label.className = kind;
       if (label.textContent !== sensor.label) label.textContent = sensor.label;
       if (label.title !== sensor.title) label.title = sensor.title ?? '';
-      label.style.setProperty('--colour', sensor.colour);
+      label.style.setProperty('--colour', css_colour(sensor.colour));
     }
   }
 

@@ -41,7 +41,7 @@ void main() {
   }
   vec3 n = normalize(shade_normal);
   float facing = gl_FrontFacing ? 1.0 : -1.0;
-  float light = 0.66 + 0.34 * max(0.0, dot(n * facing, vec3(-0.28, 0.42, 0.863)));
+  float light = 0.74 + 0.26 * max(0.0, dot(n * facing, vec3(-0.28, 0.42, 0.863)));
   colour = vec4(base * light * (gl_FrontFacing ? 1.0 : 0.6), 1.0);
 }`;
 

@@ -93,26 +93,24 @@ export class Viewer {
     for (const action of this.after_frame) action();
   }
 
-  /** The sphere that a reset view shows: the part, and what else stands round it. */
-  get whole() {
-    const { centre, diameter } = this.surface.box;
-    return this.extent ?? { centre: new Vector3(...centre), radius: diameter / 2 };
+  /** All of the part, and of what stands round it (`others`, points), from `direction`. */
+  show_all({ animate = true, direction = new Vector3(0.55, -0.72, 0.48) } = {}) {
+    const { centre, min, max, diameter } = this.surface.box;
+    const points = [...(this.others ?? [])];
+    for (let corner = 0; corner < 8; ++corner) points.push(new Vector3(...[0, 1, 2].map((axis) => (corner & (1 << axis) ? max : min)[axis])));
+    const target = new Vector3(...centre);
+    this.orbit.radius = Math.max(diameter / 2, ...points.map((point) => point.distanceTo(target)));
+    this.fly_to({ target, direction, points, animate });
   }
 
-  show_all({ animate = true, direction } = {}) {
-    const { centre, radius } = this.whole;
-    this.orbit.radius = radius;
-    this.fly_to({ target: centre, direction: direction ?? new Vector3(0.55, -0.72, 0.48), radius, animate });
-  }
-
-  /** Looks at `target` from `direction` so that a sphere of `radius` fills the view. */
-  fly_to({ target, direction, radius, animate = true }) {
+  /** Looks at `target` from `direction` so that all points, or a sphere of `radius`, are in view. */
+  fly_to({ target, direction, radius, points, animate = true }) {
     const orbit = this.orbit;
     const from = { target: orbit.target.clone(), azimuth: orbit.azimuth, elevation: orbit.elevation, distance: orbit.distance };
     if (direction) orbit.look_along(direction);
     let turn = (orbit.azimuth - from.azimuth) % (2 * Math.PI);
     if (Math.abs(turn) > Math.PI) turn -= Math.sign(turn) * 2 * Math.PI;
-    const to = { target: target.clone(), azimuth: from.azimuth + turn, elevation: orbit.elevation, distance: orbit.fitting_distance(radius) };
+    const to = { target: target.clone(), azimuth: from.azimuth + turn, elevation: orbit.elevation, distance: points ? orbit.distance_for(points, target) : orbit.fitting_distance(radius) };
     cancelAnimationFrame(this.flight);
     if (!animate || calm()) return this.#place(from, to, 1);
     const start = performance.now();
@@ -198,9 +196,12 @@ export class Viewer {
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.host;
     if (!width || !height) return;
+    const was = this.camera.aspect;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    // A part that filled the view still does when the window gets narrower.
+    if (this.surface && was > this.camera.aspect) this.orbit.distance *= Math.min(2, was / this.camera.aspect);
     this.request();
   }
 }
