@@ -116,7 +116,7 @@ export class LiveView {
     const sensors = state.scans.filter((scan) => scan.viewpoint && scan.component !== null).map((scan) => ({
       id: key_of(scan), position: scan.viewpoint, direction: scan.view_direction, colour: colour(scan), label: String(scan.arrival + 1), title: scan.name, kind: key_of(scan) === this.chosen ? 'chosen' : '' }));
     const ghosts = state.views.map((view, i) => ({ id: `view ${i}`, position: view.position, direction: view.direction, target: view.target, colour: i === 0 ? [0, 140, 90] : [110, 175, 145], label: letter_of(i), title: view.text, ghost: true, kind: 'ghost' }));
-    const links = state.links.filter((link) => link.used).map((link) => ({ from: key_of(state.scans[link.a]), to: key_of(state.scans[link.b]), colour: firmness[link.firmness] ?? firmness.weak }));
+    const links = state.links.filter((link) => link.used).map((link) => ({ from: key_of(state.scans[link.a]), to: key_of(state.scans[link.b]), overlap: link.overlap, colour: firmness[link.firmness] ?? firmness.weak }));
     this.sensors.set([...sensors, ...ghosts], links);
     this.viewer.others = this.sensors.places();
     if (!this.touched) this.viewer.show_all({ animate: this.fitted === true });

@@ -36,7 +36,12 @@ export function read_scene() {
   values.scan = with_nan(values.scan);
   values.region = with_nan(values.region);
   values.face = surface.faces && faces_of_vertices(surface);
-  return { ...surface, ...values, poses: scene.poses ?? [] };
+  return { ...surface, ...values, poses: (scene.poses ?? []).map((pose) => ({ ...pose, sensor: sensor_in_model(pose) })) };
+}
+
+/** Where the sensor stood, in the model frame; its `viewpoint` is given in the scan's own. */
+function sensor_in_model({ model_from_scan: m, viewpoint: p }) {
+  return p && m ? [0, 4, 8].map((row) => m[row] * p[0] + m[row + 1] * p[1] + m[row + 2] * p[2] + m[row + 3]) : null;
 }
 
 /** A face for each vertex. Triangles are turned so that their last corner, which a flat colour is taken from, is on their face. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the part can be coloured by. A mode: {id, label, note, values, categories, colouring(settings), legend(settings), range | null}.
 import {
-  category_colour, coverage_stops, deviation_steps, deviation_stops, even_steps, kNotScanned, lookup, stretched, uncertainty_stops,
+  category_colour, coverage_stops, deviation_steps, deviation_stops, even_steps, kNotScanned, lookup, uncertainty_stops,
 } from '../shared/colours.js';
 import { decimals_for, number, signed_mm } from '../shared/format.js';
 import { scale_bar, swatches } from '../shared/legend.js';
@@ -23,14 +23,14 @@ export function default_deviation_map(report) {
   if (report.colours?.stops?.length > 1) return { stops: report.colours.stops, steps: report.colours.steps ?? null };
   const tolerance = tolerance_of(report);
   const reach = Math.max(report.over_area?.p99 ?? 0, ...(tolerance ?? []).map((limit) => 2 * Math.abs(limit))) || 1;
-  return { stops: deviation_stops(-reach, reach), steps: null };
+  return { stops: deviation_stops(-reach, reach, tolerance), steps: null };
 }
 
 /** The deviation map over another range. */
 export function deviation_map(report, { low, high }) {
   const given = default_deviation_map(report);
   const same = low === given.stops[0].value && high === given.stops[given.stops.length - 1].value;
-  const stops = same ? given.stops : stretched(given.stops, low, high);
+  const stops = same ? given.stops : deviation_stops(low, high, tolerance_of(report));
   return { stops, steps: (same && given.steps?.length && given.steps) || deviation_steps(stops, tolerance_of(report)) };
 }
 

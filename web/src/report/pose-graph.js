@@ -9,7 +9,7 @@ export function pose_graph(report, scene) {
   const nodes_of = (report.graph?.components ?? []).flat();
   if (nodes_of.length < 2) return null;
   const centre = scene?.box.centre ?? [0, 1, 2].map((k) => (report.model.box.min[k] + report.model.box.max[k]) / 2);
-  const viewpoints = new Map((scene?.poses ?? []).map((pose) => [pose.scan, pose.viewpoint]));
+  const viewpoints = new Map((scene?.poses ?? []).map((pose) => [pose.scan, pose.sensor]));
   const by_index = new Map(report.scans.map((scan) => [scan.index, scan]));
   const name = (index) => by_index.get(index)?.name ?? `scan ${index}`;
   const pieces = report.graph.components;

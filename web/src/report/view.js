@@ -81,7 +81,7 @@ export class ReportView {
     if (this.mode.range) rows.push(this.#range_inputs(settings));
     if (this.mode.range) rows.push(check('Discrete steps', settings.steps, (on) => { settings.steps = on; this.#recolour(); }));
     rows.push(check('Outline', this.viewer.outline.visible, (on) => { this.viewer.outline.visible = on; this.viewer.request(); }));
-    if (this.scene.poses.some((pose) => pose.viewpoint)) rows.push(check('Sensors', this.sensors_on ?? false, (on) => this.show_sensors(on)));
+    if (this.scene.poses.some((pose) => pose.sensor)) rows.push(check('Sensors', this.sensors_on ?? false, (on) => this.show_sensors(on)));
     this.options.replaceChildren(...rows);
   }
 
@@ -110,9 +110,9 @@ export class ReportView {
     if (!this.sensors) {
       this.sensors = new Sensors(this.viewer, this.host);
       const name = (index) => this.report.scans[index]?.name ?? `scan ${index}`;
-      const sensors = this.scene.poses.filter((pose) => pose.viewpoint).map((pose) => ({
-        id: pose.scan, position: pose.viewpoint, colour: category_colour(pose.scan), label: String(pose.scan), title: name(pose.scan) }));
-      const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, colour: [120, 132, 146] }));
+      const sensors = this.scene.poses.filter((pose) => pose.sensor).map((pose) => ({
+        id: pose.scan, position: pose.sensor, colour: category_colour(pose.scan), label: String(pose.scan), title: name(pose.scan) }));
+      const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, overlap: link.overlap, colour: [120, 132, 146] }));
       this.sensors.set(sensors, links);
     }
     this.sensors.visible = on;

@@ -2,10 +2,8 @@
 // Colour maps. All are monotone in lightness (deviation: on either side of zero), so that they hold in grey print and for
 // eyes that tell red from green badly. A map is a list of stops {value, rgb}, linear between them in sRGB.
 
-const blue_white_red = [
-  [5, 48, 97], [33, 102, 172], [67, 147, 195], [146, 197, 222], [247, 247, 247],
-  [244, 165, 130], [214, 96, 77], [178, 24, 43], [103, 0, 31],
-];
+const from_white_to_blue = [[209, 229, 240], [146, 197, 222], [67, 147, 195], [33, 102, 172], [5, 48, 97]];
+const from_white_to_red = [[253, 219, 199], [244, 165, 130], [214, 96, 77], [178, 24, 43], [103, 0, 31]];
 const blues = [[209, 227, 243], [146, 195, 222], [75, 151, 201], [25, 100, 171], [8, 48, 107]];
 const browns = [[255, 247, 214], [254, 211, 112], [244, 147, 38], [190, 82, 8], [94, 34, 6]];
 const purples = [[69, 27, 120], [116, 83, 165], [160, 144, 197], [206, 200, 226], [240, 238, 246]];
@@ -15,20 +13,20 @@ export const kNotScanned = [154, 158, 163];
 const spread = (colours, low, high) =>
   colours.map((rgb, i) => ({ value: low + ((high - low) * i) / (colours.length - 1), rgb }));
 
-/** Blue below zero, red above; `low` < 0 < `high`. */
-export const deviation_stops = (low, high) => {
-  const half = (blue_white_red.length - 1) / 2;
-  return blue_white_red.map((rgb, i) => ({ value: i <= half ? low * (1 - i / half) : (high * (i - half)) / half, rgb }));
-};
+/** One side of the deviation map, from zero outwards. What is within tolerance stays pale, and the limit is a jump. */
+function deviation_side(hues, end, limit) {
+  const at = (share) => limit + share * (end - limit);
+  if (!(limit / end > 0 && limit / end < 1)) return hues.map((rgb, i) => ({ value: (end * (i + 1)) / hues.length, rgb }));
+  const jump = hues[1].map((from, k) => (from + hues[2][k]) / 2);
+  return [{ value: limit, rgb: hues[0] }, { value: at(0.001), rgb: jump }, { value: at(0.3), rgb: hues[2] }, { value: at(0.65), rgb: hues[3] }, { value: end, rgb: hues[4] }];
+}
+
+/** Blue below zero, red above; `low` < 0 < `high`; `tolerance` is [low, high] or null. */
+export const deviation_stops = (low, high, tolerance = null) =>
+  [...deviation_side(from_white_to_blue, low, tolerance?.[0]).reverse(), { value: 0, rgb: [247, 247, 247] }, ...deviation_side(from_white_to_red, high, tolerance?.[1])];
 export const coverage_stops = (low, high) => spread(blues, low, high);
 export const uncertainty_stops = (low, high) => spread(browns, low, high);
 export const age_stops = (low, high) => spread(purples, low, high);
-
-/** The stops of another range: each side of zero stretched on its own, so that zero keeps its colour. */
-export function stretched(stops, low, high) {
-  const [old_low, old_high] = [stops[0].value, stops[stops.length - 1].value];
-  return stops.map(({ value, rgb }) => ({ value: value < 0 ? (value / old_low) * low : old_high ? (value / old_high) * high : 0, rgb }));
-}
 
 /** RGB (0 to 255) at a value; the ends hold beyond the range. */
 export function colour_at(stops, value) {
@@ -43,21 +41,14 @@ export function colour_at(stops, value) {
 }
 
 /** Discrete steps of a deviation map: the tolerance band is one step, what lies beyond is cut into `each` on either side. */
-export function deviation_steps(stops, tolerance, each = 4) {
+export function deviation_steps(stops, tolerance, each = 5) {
   const low = stops[0].value;
   const high = stops[stops.length - 1].value;
-  const inside = tolerance && tolerance[0] > low && tolerance[1] < high;
+  const inside = tolerance && tolerance[0] > low && tolerance[1] < high && tolerance[0] < 0 && tolerance[1] > 0;
   const band = inside ? tolerance : [low / (2 * each + 1), high / (2 * each + 1)];
-  const edges = [];
-  for (let i = 0; i < each; ++i) edges.push(low + ((band[0] - low) * i) / each);
-  edges.push(band[0]);
-  for (let i = 0; i <= each; ++i) edges.push(band[1] + ((high - band[1]) * i) / each);
-  return edges.slice(1).map((to, i) => {
-    const from = edges[i];
-    // Each step shows its far end's side of the map, so that steps beyond the band never look like the band.
-    const at = i < each ? from + (to - from) * 0.35 : i === each ? 0 : from + (to - from) * 0.65;
-    return { from, to, rgb: colour_at(stops, at).map(Math.round) };
-  });
+  const side = (from, to) => Array.from({ length: each }, (_, i) => ({ from: from + ((to - from) * i) / each, to: from + ((to - from) * (i + 1)) / each }));
+  return [...side(low, band[0]), { from: band[0], to: band[1] }, ...side(band[1], high)].map((step, i) => (
+    { ...step, rgb: i === each ? [247, 247, 247] : colour_at(stops, (step.from + step.to) / 2).map(Math.round) }));
 }
 
 /** Equal steps of any map. */
@@ -85,10 +76,10 @@ export function lookup(stops, steps, size = 512) {
   return texels;
 }
 
-/** A colour for the i-th of many things that must be told apart: hues by the golden angle, three lightnesses in turn. */
+/** A colour for the i-th of many things that must be told apart: hues by the golden angle, four lightnesses in turn. */
 export function category_colour(i) {
   const hue = (i * 137.508 + 220) % 360;
-  const lightness = [0.62, 0.76, 0.5][i % 3];
+  const lightness = [0.62, 0.79, 0.48, 0.71][i % 4];
   const chroma = 0.12;
   const [a, b] = [chroma * Math.cos((hue * Math.PI) / 180), chroma * Math.sin((hue * Math.PI) / 180)];
   return rgb_of_oklab(lightness, a, b);

@@ -39,7 +39,7 @@ export function scale_bar({ stops, steps, tolerance, signs, whole_numbers }) {
       stops.map(({ value, rgb }) => svg('stop', { offset: (value - low) / (high - low), 'stop-color': css_colour(rgb) })))));
     bar.append(svg('rect', { x: 0, y: 0, width: 26, height: kHeight, fill: `url(#${id})` }));
   }
-  bar.append(svg('rect', { x: 0.5, y: 0.5, width: 25, height: kHeight - 1, class: 'frame' }));
+  bar.append(svg('rect', { x: 0.5, y: 0.5, width: 25, height: kHeight - 1, class: 'border' }));
   const values = steps && whole_numbers ? steps.map((step) => (step.from + step.to) / 2) : ticks(low, high);
   const decimals = whole_numbers ? 0 : decimals_of(values);
   for (const value of values) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors round the part: one instanced pyramid each, links as lines between them, labels as HTML above the canvas.
+// Sensors round the part: one instanced pyramid each, links as bars between them, as thick as the overlap, labels as HTML above the canvas.
 import {
-  BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, InstancedMesh, LineBasicMaterial, LineSegments,
-  Matrix4, MeshBasicMaterial, Quaternion, SRGBColorSpace, Vector3,
+  BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Group, InstancedMesh, Matrix4, MeshBasicMaterial,
+  Quaternion, SRGBColorSpace, Vector3,
 } from 'three';
 import { css_colour } from './colours.js';
 
@@ -20,20 +20,33 @@ function pyramid_geometry() {
   return geometry;
 }
 
+/** A square bar from the origin to (0, 0, 1), 2 wide, without ends. */
+function bar_geometry() {
+  const points = [0, 1].flatMap((z) => [[-1, -1, z], [1, -1, z], [1, 1, z], [-1, 1, z]]);
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(new Float32Array(points.flat()), 3));
+  geometry.setIndex([0, 1, 2, 3].flatMap((i) => { const j = (i + 1) % 4; return [i, j, j + 4, i, j + 4, i + 4]; }));
+  return geometry;
+}
+
+/** Tells the graphics card that the first `count` instances are new. */
+function changed(mesh, count) {
+  mesh.count = count;
+  mesh.instanceMatrix.needsUpdate = true;
+  if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
+}
+
 export class Sensors {
   /** Draws into the viewer; `select(id)` is called when a label is pressed. */
   constructor(viewer, host, select = () => {}) {
-    Object.assign(this, { viewer, select, labels: new Map(), capacity: 0 });
+    Object.assign(this, { viewer, select, labels: new Map() });
     this.group = new Group();
     viewer.extras.add(this.group);
     this.layer = document.createElement('div');
     this.layer.className = 'sensor-labels';
     host.append(this.layer);
     this.geometry = pyramid_geometry();
-    this.lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.9 }));
-    this.lines.frustumCulled = false;
-    this.group.add(this.lines);
-    this.line_capacity = 0;
+    this.bar_geometry = bar_geometry();
     viewer.after_frame.push(() => this.#place_labels());
   }
 
@@ -47,11 +60,11 @@ export class Sensors {
     return middle.add(offset);
   }
 
-  /** sensors: [{id, position, direction | null, colour: rgb, label, title, ghost, kind}]; links: [{from: id, to: id, colour}]. */
+  /** sensors: [{id, position, direction | null, colour: rgb, label, title, ghost, kind}]; links: [{from: id, to: id, colour, overlap}]. */
   set(sensors, links) {
     const { diameter, centre } = this.viewer.surface.box;
-    this.#reserve(sensors.length);
-    const size = diameter * 0.055;
+    this.mesh = this.#with_room(this.mesh, this.geometry, sensors.length);
+    const size = diameter * 0.07;
     this.shown = sensors.map((sensor) => ({ ...sensor, at: this.drawn_at(sensor.position) }));
     const forward = new Vector3(0, 0, 1);
     this.shown.forEach((sensor, i) => {
@@ -61,12 +74,8 @@ export class Sensors {
       this.mesh.setMatrixAt(i, new Matrix4().compose(sensor.at, turn, new Vector3(scale, scale, scale)));
       this.mesh.setColorAt(i, shade_of(sensor.colour));
     });
-    if (this.mesh) {
-      this.mesh.count = sensors.length;
-      this.mesh.instanceMatrix.needsUpdate = true;
-      if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
-    }
-    this.#set_lines(links);
+    if (this.mesh) changed(this.mesh, sensors.length);
+    this.#set_bars(links);
     this.#set_labels();
     this.viewer.request();
   }
@@ -82,51 +91,38 @@ export class Sensors {
     this.viewer.request();
   }
 
-  #reserve(count) {
-    if (count <= this.capacity) return;
-    this.capacity = Math.max(16, 2 * count);
-    if (this.mesh) {
-      this.group.remove(this.mesh);
-      this.mesh.dispose();
-      this.mesh.material.dispose();
+  /** `mesh` if it holds so many instances, else a larger one in its place; what it held on the graphics card is freed. */
+  #with_room(mesh, geometry, count) {
+    if (count <= (mesh?.instanceMatrix.count ?? 0)) return mesh;
+    if (mesh) {
+      this.group.remove(mesh);
+      mesh.dispose();
+      mesh.material.dispose();
     }
-    this.mesh = new InstancedMesh(this.geometry, new MeshBasicMaterial({ side: DoubleSide, transparent: true, opacity: 0.85 }), this.capacity);
-    this.mesh.instanceMatrix.setUsage(DynamicDrawUsage);
-    this.mesh.frustumCulled = false;
-    this.group.add(this.mesh);
+    const larger = new InstancedMesh(geometry, new MeshBasicMaterial({ side: DoubleSide }), Math.max(32, 2 * count));
+    larger.instanceMatrix.setUsage(DynamicDrawUsage);
+    larger.frustumCulled = false;
+    this.group.add(larger);
+    return larger;
   }
 
-  #set_lines(links) {
+  #set_bars(links) {
     const by_id = new Map(this.shown.map((sensor) => [sensor.id, sensor]));
-    const pairs = links.filter(({ from, to }) => by_id.has(from) && by_id.has(to));
+    const { diameter } = this.viewer.surface.box;
+    const bars = links.filter(({ from, to }) => by_id.has(from) && by_id.has(to)).map(({ from, to, colour, overlap }) => ({
+      from: by_id.get(from).at, to: by_id.get(to).at, colour, width: diameter * (0.0012 + 0.005 * (overlap ?? 0.2)) }));
     // A ghost is tied to what it would look at.
-    const rays = this.shown.filter((sensor) => sensor.target);
-    const needed = 2 * (pairs.length + rays.length);
-    const geometry = this.lines.geometry;
-    if (needed > this.line_capacity) {
-      this.line_capacity = Math.max(128, 2 * needed);
-      geometry.dispose();
-      for (const name of ['position', 'color']) geometry.setAttribute(name, new BufferAttribute(new Float32Array(3 * this.line_capacity), 3));
-    }
-    const position = geometry.getAttribute('position');
-    const colours = geometry.getAttribute('color');
-    let i = 0;
-    const put = (point, colour) => {
-      position.setXYZ(i, point.x, point.y, point.z);
-      colours.setXYZ(i++, colour.r, colour.g, colour.b);
-    };
-    for (const { from, to, colour } of pairs) {
-      const shade = shade_of(colour);
-      put(by_id.get(from).at, shade);
-      put(by_id.get(to).at, shade);
-    }
-    for (const sensor of rays) {
-      const shade = shade_of(sensor.colour);
-      put(sensor.at, shade);
-      put(new Vector3(...sensor.target), shade);
-    }
-    geometry.setDrawRange(0, needed);
-    if (position) position.needsUpdate = colours.needsUpdate = true;
+    for (const { target, at, colour } of this.shown) if (target) bars.push({ from: at, to: new Vector3(...target), colour, width: diameter * 0.0022 });
+    this.bars = this.#with_room(this.bars, this.bar_geometry, bars.length);
+    if (!this.bars) return;
+    const along = new Vector3(0, 0, 1);
+    bars.forEach(({ from, to, colour, width }, i) => {
+      const way = to.clone().sub(from);
+      const length = way.length() || 1;
+      this.bars.setMatrixAt(i, new Matrix4().compose(from, new Quaternion().setFromUnitVectors(along, way.divideScalar(length)), new Vector3(width, width, length)));
+      this.bars.setColorAt(i, shade_of(colour));
+    });
+    changed(this.bars, bars.length);
   }
 
   #set_labels() {

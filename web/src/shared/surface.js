@@ -64,7 +64,7 @@ export function open_edges(triangles) {
     i = end;
   }
   // A surface in crumbs has no outline worth drawing.
-  return edges.length > triangles.length / 3 ? new Uint32Array(0) : new Uint32Array(edges);
+  return edges.length > Math.max(5000, triangles.length / 5) ? new Uint32Array(0) : new Uint32Array(edges);
 }
 
 /** The nearest hit of a ray from the side it comes from: {triangle, point, weights} or null. Möller and Trumbore. */

@@ -74,7 +74,7 @@ export function example_report({ triangles = 6000 } = {}) {
   const scene = { schema: 1, vertices: packed_positions(mesh.positions), triangles: packed('u32', Uint32Array.from(mesh.triangles)),
     faces: packed('u32', Uint32Array.from(mesh.faces)), deviation: packed('f32', deviation), sigma: packed('f32', sigma), support: packed('u16', support),
     scan: packed('u16', scan), region: packed('u16', region),
-    poses: sensors.map((viewpoint, i) => ({ scan: i, model_from_scan: [1, 0, 0, viewpoint[0], 0, 1, 0, viewpoint[1], 0, 0, 1, viewpoint[2], 0, 0, 0, 1], viewpoint })) };
+    poses: sensors.map((viewpoint, i) => ({ scan: i, model_from_scan: [1, 0, 0, viewpoint[0], 0, 1, 0, viewpoint[1], 0, 0, 1, viewpoint[2], 0, 0, 0, 1], viewpoint: [0, 0, 0] })) };
   return { report: report_of(mesh, { deviation, sigma, support, scan, region, seen, shared, tolerance }), scene, mesh, deviation };
 }
 
