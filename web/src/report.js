@@ -48,14 +48,19 @@ async function main() {
     document.getElementById('page').append(h('p', { class: 'problem' }, 'This page holds no report: it is the form that asbuilt fills in.'));
     return;
   }
+  performance.mark('asbuilt: report read');
   const scene = read_scene();
+  performance.mark('asbuilt: scene read');
   const { view, pictures } = build(report, scene);
+  performance.mark('asbuilt: text there');
   if (view) {
     await next_picture();
+    performance.mark('asbuilt: text shown');
     try {
       view.start();
       window.asbuilt = { view, report };
       await next_picture();
+      performance.mark('asbuilt: view shown');
       document.documentElement.dataset.view = 'ready';
       await pictures.draw();
     } catch (error) {
@@ -63,6 +68,7 @@ async function main() {
       pictures.element.parentElement.hidden = true;
     }
   }
+  performance.mark('asbuilt: pictures there');
   document.documentElement.dataset.ready = 'true';
 }
 

@@ -13,18 +13,24 @@ export class Pictures {
       make_button(figure, `Show ${name} in 3D`, () => { view.look(direction); view.element.scrollIntoView({ behavior: 'smooth' }); });
       return figure;
     })), this.legend);
-    view.listeners.push((mode) => { if (mode.id === 'deviation') this.#soon(); });
+    view.listeners.push((mode) => { if (mode.id === 'deviation' && this.drawn) this.#soon(); });
   }
 
-  /** One picture between two frames, so that the page stays alive; resolves when all are there. */
-  async draw() {
+  /** Draws all pictures; one that is under way is given up for the new one. Resolves when all are there. */
+  draw() {
+    clearTimeout(this.timer);
+    return (this.drawn = this.#draw());
+  }
+
+  /** One picture between two frames, so that the page stays alive. */
+  async #draw() {
     const run = (this.run = (this.run ?? 0) + 1);
     const { viewer, modes, settings } = this.view;
     const deviation = modes[0];
     this.legend.replaceChildren(...deviation.legend(settings[deviation.id]));
     for (let i = 0; i < directions.length; ++i) {
       await new Promise((resolve) => setTimeout(resolve));
-      if (run !== this.run) return;
+      if (run !== this.run) return this.drawn;
       const mode = this.view.mode;
       if (mode !== deviation) { viewer.set_values(deviation.values); viewer.set_colouring(deviation.colouring(settings[deviation.id])); }
       this.images[i].src = viewer.picture({ ...directions[i], width: 640, height: 480 });

@@ -4,6 +4,7 @@ import { DataTexture, FrontSide, DoubleSide, GLSL3, NearestFilter, RawShaderMate
 
 // `datum` is (value * known, known): interpolated across a triangle with unknown corners, their quotient is the mean of
 // the corners that are known. Categories are taken from one corner of the triangle instead.
+// Light is computed a vertex: the surface is fine, and software renderers pay for every number interpolated.
 const vertex_shader = `
 precision highp float;
 uniform mat4 modelViewMatrix, projectionMatrix;
@@ -11,38 +12,43 @@ uniform mat3 normalMatrix;
 in vec3 position;
 in vec4 normal;
 in vec2 datum;
-out vec3 shade_normal;
-out vec2 smooth_datum;
-flat out vec2 flat_datum;
+out vec3 shown;  // datum, light
+#ifdef CATEGORIES
+flat out vec2 category;
+#endif
 void main() {
-  shade_normal = normalMatrix * normal.xyz;
-  smooth_datum = datum;
-  flat_datum = datum;
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  float facing = dot(normalize(normalMatrix * normal.xyz), vec3(-0.28, 0.42, 0.863));
+  shown = vec3(datum, facing);
+#ifdef CATEGORIES
+  category = datum;
+#endif
+  gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
 }`;
 
 const fragment_shader = `
 precision highp float;
 uniform sampler2D table;
 uniform float low, high, hatch;
-uniform bool categories;
 uniform vec3 unknown_a, unknown_b;
-in vec3 shade_normal;
-in vec2 smooth_datum;
-flat in vec2 flat_datum;
+in vec3 shown;
+#ifdef CATEGORIES
+flat in vec2 category;
+#endif
 out vec4 colour;
 void main() {
-  vec2 datum = categories ? flat_datum : smooth_datum;
+#ifdef CATEGORIES
+  vec2 datum = category;
+#else
+  vec2 datum = shown.xy;
+#endif
   vec3 base;
   if (datum.y < 0.5) {
     base = fract((gl_FragCoord.x + gl_FragCoord.y) / hatch) < 0.5 ? unknown_a : unknown_b;
   } else {
     base = texture(table, vec2(clamp((datum.x / datum.y - low) / (high - low), 0.0, 1.0), 0.5)).rgb;
   }
-  vec3 n = normalize(shade_normal);
-  float facing = gl_FrontFacing ? 1.0 : -1.0;
-  float light = 0.74 + 0.26 * max(0.0, dot(n * facing, vec3(-0.28, 0.42, 0.863)));
-  colour = vec4(base * light * (gl_FrontFacing ? 1.0 : 0.6), 1.0);
+  float light = gl_FrontFacing ? 0.74 + 0.26 * max(0.0, shown.z) : 0.44 + 0.16 * max(0.0, -shown.z);
+  colour = vec4(base * light, 1.0);
 }`;
 
 function table_texture(texels) {
@@ -55,6 +61,7 @@ function table_texture(texels) {
 export function surface_material({ open = false } = {}) {
   return new RawShaderMaterial({
     glslVersion: GLSL3,
+    defines: {},
     vertexShader: vertex_shader,
     fragmentShader: fragment_shader,
     side: open ? DoubleSide : FrontSide,
@@ -63,7 +70,7 @@ export function surface_material({ open = false } = {}) {
     polygonOffsetUnits: 1,
     uniforms: {
       table: { value: table_texture(new Uint8Array(4)) },
-      low: { value: 0 }, high: { value: 1 }, hatch: { value: 9 }, categories: { value: false },
+      low: { value: 0 }, high: { value: 1 }, hatch: { value: 9 },
       unknown_a: { value: new Vector3(0.604, 0.62, 0.64) }, unknown_b: { value: new Vector3(0.7, 0.714, 0.733) },
     },
   });
@@ -82,7 +89,10 @@ export function apply_colouring(material, { texels, low, high, categories = fals
   }
   uniforms.low.value = low;
   uniforms.high.value = high;
-  uniforms.categories.value = categories;
+  if (categories !== ('CATEGORIES' in material.defines)) {
+    material.defines = categories ? { CATEGORIES: '' } : {};
+    material.needsUpdate = true;
+  }
   if (unknown) {
     uniforms.unknown_a.value.fromArray(unknown[0]).divideScalar(255);
     uniforms.unknown_b.value.fromArray(unknown[1]).divideScalar(255);

@@ -4,34 +4,46 @@ import {
   BufferAttribute, BufferGeometry, Group, LineBasicMaterial, LineSegments, Mesh, NoToneMapping, OrthographicCamera,
   PerspectiveCamera, Scene, Vector3, WebGLRenderer, WebGLRenderTarget,
 } from 'three';
+import { coarser_triangles } from './coarse.js';
 import { Orbit } from './orbit.js';
 import { pick } from './surface.js';
 import { apply_colouring, surface_material } from './surface-material.js';
+
+// While the part moves and the machine is slow: so many triangles, and so many pixels a px.
+const kCoarseTriangles = 30000;
+const kCoarsePixels = 0.5;
+const kSlowFrame = 45;  // ms
+const kRest = 180;      // ms without motion after which all is drawn again
 
 const calm = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 export class Viewer {
   /** Draws into a canvas that fills `host`; throws if the browser has no WebGL 2. */
-  constructor(host, { antialias = true, most_pixels_per_px = 2 } = {}) {
+  constructor(host, { antialias = true, most_pixels_per_px = 2, background = 0xf1f4f7 } = {}) {
+    this.background = background;
     this.host = host;
     this.canvas = document.createElement('canvas');
     Object.assign(this.canvas, { tabIndex: 0 });
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'The part in 3D. Arrow keys turn it, shift and arrows move it, plus and minus zoom, 0 shows all of it.');
-    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias, alpha: true, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias, alpha: false, powerPreference: 'high-performance' });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, most_pixels_per_px));
+    this.renderer.setClearColor(background, 1);
     this.renderer.toneMapping = NoToneMapping;
     this.scene = new Scene();
     this.extras = new Group();
     this.scene.add(this.extras);
     this.camera = new PerspectiveCamera(28, 1, 1, 1000);
-    this.orbit = new Orbit(this.camera, this.canvas, () => this.request());
+    this.pixels_per_px = this.renderer.getPixelRatio();
+    this.slow = is_software(this.renderer.getContext());
+    this.orbit = new Orbit(this.camera, this.canvas, () => this.#moved());
     this.orbit.clicked = (x, y) => this.#clicked(x, y);
     this.orbit.clicked_centre = () => this.#clicked_centre();
     this.orbit.home = () => this.show_all();
     this.frames = 0;
     this.after_frame = [];
     host.prepend(this.canvas);
+    this.coarse = false;
     this.resizing = new ResizeObserver(() => this.#resize());
     this.resizing.observe(host);
     this.canvas.addEventListener('webglcontextrestored', () => this.request());
@@ -46,7 +58,8 @@ export class Viewer {
     geometry.setAttribute('normal', new BufferAttribute(surface.normals, 4, true));
     this.data = new Float32Array((surface.positions.length / 3) * 2);
     geometry.setAttribute('datum', new BufferAttribute(this.data, 2));
-    geometry.setIndex(new BufferAttribute(surface.triangles, 1));
+    this.triangles = new BufferAttribute(surface.triangles, 1);
+    geometry.setIndex(this.triangles);
     this.material = surface_material({ open });
     this.mesh = new Mesh(geometry, this.material);
     this.mesh.frustumCulled = false;
@@ -76,6 +89,28 @@ export class Viewer {
     this.request();
   }
 
+  /** The camera moved: draws soon, coarsely if the machine is slow, and all of it once the camera rests. */
+  #moved() {
+    const now = performance.now();
+    // Several slow frames in a row, not one that something else held up.
+    this.slow_frames = now - this.last_move > kSlowFrame && now - this.last_move < 1000 ? (this.slow_frames ?? 0) + 1 : 0;
+    this.slow ||= this.slow_frames > 5;
+    this.last_move = now;
+    if (this.slow) this.#set_coarse(true);
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.#set_coarse(false), kRest);
+    this.request();
+  }
+
+  #set_coarse(on) {
+    if (!this.surface || on === this.coarse) return;
+    this.coarse = on;
+    if (on) this.coarse_triangles ??= new BufferAttribute(coarser_triangles(this.surface, kCoarseTriangles), 1);
+    this.mesh.geometry.setIndex(on ? this.coarse_triangles : this.triangles);
+    this.renderer.setPixelRatio(on ? Math.min(this.pixels_per_px, kCoarsePixels * Math.max(1, this.pixels_per_px)) : this.pixels_per_px);
+    this.request();
+  }
+
   /** Draws once before the browser shows its next picture, however often it is asked. */
   request() {
     if (this.pending) return;
@@ -87,7 +122,7 @@ export class Viewer {
 
   draw() {
     this.orbit.apply();
-    if (this.material) this.material.uniforms.hatch.value = 9 * this.renderer.getPixelRatio();
+    if (this.material) this.material.uniforms.hatch.value = Math.max(2, 9 * this.renderer.getPixelRatio());
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
     for (const action of this.after_frame) action();
@@ -129,6 +164,7 @@ export class Viewer {
     orbit.elevation = from.elevation + (to.elevation - from.elevation) * t;
     orbit.distance = from.distance * (to.distance / from.distance) ** t;
     orbit.apply();
+    if (t < 1) this.#moved();
     this.request();
   }
 
@@ -157,6 +193,7 @@ export class Viewer {
 
   /** A picture of the part alone, parallel projection, on white: a PNG as data URL. */
   picture({ direction, up = [0, 0, 1], width, height, samples = 4 }) {
+    this.#set_coarse(false);
     const { centre, min, max } = this.surface.box;
     const camera = new OrthographicCamera();
     const middle = new Vector3(...centre);
@@ -187,7 +224,7 @@ export class Viewer {
     const pixels = new Uint8Array(width * height * 4);
     this.renderer.readRenderTargetPixels(target, 0, 0, width, height, pixels);
     this.renderer.setRenderTarget(null);
-    this.renderer.setClearColor(0xffffff, 0);
+    this.renderer.setClearColor(this.background, 1);
     this.extras.visible = shown;
     target.dispose();
     return url_of(pixels, width, height);
@@ -204,6 +241,12 @@ export class Viewer {
     if (this.surface && was > this.camera.aspect) this.orbit.distance *= Math.min(2, was / this.camera.aspect);
     this.request();
   }
+}
+
+/** Whether the processor draws in place of a graphics card. */
+function is_software(gl) {
+  const extension = gl.getExtension('WEBGL_debug_renderer_info');
+  return extension ? /swiftshader|llvmpipe|softpipe|software|basic render/i.test(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL)) : false;
 }
 
 /** WebGL's rows run upwards, a picture's downwards. */

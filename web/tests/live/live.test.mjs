@@ -103,7 +103,7 @@ test('unscanned surface is orange stripes from the start', { timeout: kPatience 
     const at = viewer.project(viewer.surface.box.centre);
     const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
     let orange = 0, other = 0;
-    for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 250) (data[i] > data[i + 2] + 60 ? ++orange : ++other);
+    for (let i = 0; i < data.length; i += 4) if (data[i] !== data[0] || data[i + 2] !== data[2]) (data[i] > data[i + 2] + 60 ? ++orange : ++other);
     return { orange, other, at };
   });
   assert.ok(colours.orange > 5 * colours.other, JSON.stringify(colours));

@@ -37,7 +37,7 @@ export function own_folder() {
   return { path, remove: () => rmSync(path, { recursive: true, force: true }) };
 }
 
-/** Shares of the canvas' pixels: {drawn: not transparent, colours: how many different (in steps of 16)}. */
+/** Shares of the canvas' pixels: {drawn: not background, colours: how many different (in steps of 16)}. */
 export const canvas_figures = (tab) => tab.evaluate(() => {
   const { viewer } = (window.asbuilt.view);
   viewer.draw();
@@ -49,7 +49,7 @@ export const canvas_figures = (tab) => tab.evaluate(() => {
   const colours = new Set();
   let drawn = 0;
   for (let i = 0; i < data.length; i += 4) {
-    if (data[i + 3] < 128) continue;
+    if (data[i] === data[0] && data[i + 1] === data[1] && data[i + 2] === data[2]) continue;
     ++drawn;
     colours.add(((data[i] >> 4) << 8) | ((data[i + 1] >> 4) << 4) | (data[i + 2] >> 4));
   }
