@@ -21,7 +21,7 @@ export function provenance(report) {
       ['Motion applied', is_identity(alignment.model_from_given) ? 'none' : matrix(alignment.model_from_given)], ['RMS before, after', typeof alignment.rms_after === 'number' ? `${mm(alignment.rms_before, 4)}, ${mm(alignment.rms_after, 4)}` : null],
       ...(refinement ?? []).map((r) => [`Refinement${refinement.length > 1 ? `, piece ${r.component + 1}` : ''}`, `${number(r.iterations)} iterations, RMS ${mm(r.rms_before, 3)} to ${mm(r.rms_after, 3)}, ${r.converged ? 'converged' : 'not converged'}`])])),
     block('Tolerance', tolerance ? rows([['Limits', tolerance.low === null ? 'from the file alone' : `${number(tolerance.low, 3)} to ${number(tolerance.high, 3)} mm`], ['Source', tolerance.source], ['Must be within', percent(tolerance.required_share)], ['Must be scanned', percent(tolerance.minimum_coverage)], ['Rows of the file', tolerance.rows?.length ? number(tolerance.rows.length) : null]]) : h('p', { class: 'soft' }, 'None was given.')),
-    block('Options', rows(Object.entries(report.options ?? {}).map(([name, value]) => [name, typeof value === 'object' ? JSON.stringify(value) : String(value)])), 'options'),
+    block('Options', rows(Object.entries(report.options ?? {}).map(([name, value]) => [name, typeof value === 'object' ? JSON.stringify(value) : String(value)])), 'wide all-options'),
     block('Files', files_table({ model, measured, reference, scans: report.scans }), 'wide'));
 }
 

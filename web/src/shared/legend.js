@@ -43,7 +43,7 @@ export function scale_bar({ stops, steps, tolerance, signs, whole_numbers }) {
   const values = steps && whole_numbers ? steps.map((step) => (step.from + step.to) / 2) : ticks(low, high);
   const decimals = whole_numbers ? 0 : decimals_of(values);
   for (const value of values) {
-    const crowded = tolerance?.some((limit) => Math.abs(y(limit) - y(value)) < 13 && Math.abs(limit - value) > (high - low) * 1e-6);
+    const crowded = tolerance?.some((limit) => limit >= low && limit <= high && Math.abs(y(limit) - y(value)) < 13);
     bar.append(svg('line', { x1: 26, x2: 31, y1: y(value), y2: y(value), class: 'tick' }));
     if (!crowded) bar.append(svg('text', { x: 35, y: y(value) + 4.2 }, signs ? signed(value, decimals) : number(value, decimals)));
   }
