@@ -22,10 +22,12 @@ std::string summary(const inspect::DeviationReport& report, const std::string& f
       "deviation over the scanned surface: mean {:+.4g} mm, sigma {:.4g} mm, rms {:.4g} mm, 95 % within {:.4g} mm\n",
       report.deviation_mm.size(), 100.0 * report.coverage, area.mean, area.sigma, area.rms, area.p95);
   if (area.in_tolerance) {
-    text += fmt::format("tolerance: {:.2f} % within, {:.2f} % over, {:.2f} % under\n", 100.0 * *area.in_tolerance,
-                        100.0 * area.over_tolerance.value_or(0.0), 100.0 * area.under_tolerance.value_or(0.0));
+    text += fmt::format("tolerance: {}, {:.2f} % within, {:.2f} % over, {:.2f} % under\n",
+                        inspect::name_of(report.verdict.value_or(inspect::Verdict::not_scanned)),
+                        100.0 * *area.in_tolerance, 100.0 * area.over_tolerance.value_or(0.0),
+                        100.0 * area.under_tolerance.value_or(0.0));
   }
-  return text + fmt::format("report: {}\n", (std::filesystem::path(folder) / "report.json").string());
+  return text + fmt::format("report: {}\n", (std::filesystem::path(folder) / "report.html").string());
 }
 
 Result<int> run(const Arguments& arguments, Shell& shell) {
@@ -35,7 +37,7 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   shell.print_json(json);
   shell.print_result(summary(report, arguments.output));
   if (report.over_area.count == 0) return kNotDone;
-  return report.within_tolerance(arguments.options.inspect).value_or(true) ? kDone : kOutOfTolerance;
+  return report.verdict.value_or(inspect::Verdict::pass) == inspect::Verdict::pass ? kDone : kOutOfTolerance;
 }
 
 }  // namespace
@@ -49,14 +51,15 @@ void add_inspect_command(CLI::App& app, Shell& shell) {
   add_common_options(*command, shell);
   add_pipeline_options(*command, arguments->options, {pipeline::Half::model});
   add_unit_option(*command, "--scan-unit", arguments->options.scan_unit, "Unit of the cloud");
-  add_tolerance_option(*command, arguments->options);
+  add_inspection_options(*command, arguments->options);
   for_each_field(arguments->options.inspect, [&](const char* name, auto& value, const char* help) {
     add_field(*command, std::string("inspect_") + name, value, help, "Inspection");
   });
   command->footer(
       "Examples:\n"
       "  asbuilt inspect part.stl result/reconstruction.ply -o deviation\n"
-      "  asbuilt inspect part.stl measured.stl -o deviation --tolerance -0.2,0.2 --json");
+      "  asbuilt inspect part.stl measured.stl -o deviation --tolerance -0.2,0.2 --json\n"
+      "  asbuilt inspect part.step cloud.ply -o deviation --tolerance tolerances.csv --alignment best-fit --views");
   run_on_call(*command, shell, [arguments, &shell] { return run(*arguments, shell); });
 }
 

@@ -15,7 +15,7 @@ Result<int> reported(const Result<io::RunRecord>& record, const Arguments& argum
   if (!record) return tl::unexpected(record.error());
   shell.print_json(io::to_json(*record));
   shell.print_result(summary_of(*record, arguments.output));
-  return exit_code_of(*record, arguments.options);
+  return exit_code_of(*record);
 }
 
 std::shared_ptr<Arguments> add_inputs(CLI::App& command) {

@@ -26,7 +26,7 @@ void add_info_command(CLI::App& app, Shell& shell);
 [[nodiscard]] std::string summary_of(const io::RunRecord& record, const std::string& folder);
 
 /// The exit code that a finished run deserves.
-[[nodiscard]] int exit_code_of(const io::RunRecord& record, const pipeline::Options& options);
+[[nodiscard]] int exit_code_of(const io::RunRecord& record);
 
 /// Where a verb writes.
 [[nodiscard]] pipeline::Output output_of(const std::string& folder, Shell& shell);

@@ -45,6 +45,7 @@ int run(std::vector<std::string> arguments, Shell& shell) {
       shell.finish(complete.error());
       return shell.leave();
     }
+    shell.arguments = *complete;
     std::ranges::reverse(*complete);  // CLI11 takes them from the back
     app.parse(std::move(*complete));
   } catch (const CLI::ParseError& error) {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
+#include <optional>
 
 namespace asbuilt::cli {
 namespace {
@@ -73,7 +75,29 @@ void add_joint_options(CLI::App& command, pipeline::Options& options) {
           "How the whole is brought into the model frame: best_fit or fixed (to the fixed scan)")
       ->check(CLI::IsMember({"best_fit", "fixed"}))
       ->default_str("best_fit");
-  add_tolerance_option(command, options);
+  add_inspection_options(command, options);
+}
+
+std::optional<inspect::Tolerance> low_and_high(const std::string& text) {
+  inspect::Tolerance tolerance;
+  const char* const end = text.data() + text.size();
+  const auto low = std::from_chars(text.data(), end, tolerance.low_mm);
+  if (low.ec != std::errc() || low.ptr == end || *low.ptr != ',') return std::nullopt;
+  const auto high = std::from_chars(low.ptr + 1, end, tolerance.high_mm);
+  return high.ec == std::errc() && high.ptr == end ? std::optional(tolerance) : std::nullopt;
+}
+
+void take_tolerance(const std::string& text, pipeline::Options& options) {
+  options.inspect.tolerance = low_and_high(text);
+  if (options.inspect.tolerance) return;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(text, ignored)) {
+    throw CLI::ValidationError("--tolerance",
+                               fmt::format("found '{}', expected LOW,HIGH in mm, for example -0.5,0.5, or a "
+                                           "CSV or JSON file that exists",
+                                           text));
+  }
+  options.tolerance_file = text;
 }
 
 }  // namespace
@@ -95,23 +119,36 @@ void add_unit_option(CLI::App& command, const std::string& name, io::Unit& unit,
       help + " (as the file states, else mm)");
 }
 
-void add_tolerance_option(CLI::App& command, pipeline::Options& options) {
-  command.add_option_function<std::string>(
-      "--tolerance",
-      [&options](const std::string& text) {
-        inspect::Tolerance tolerance;
-        const char* const end = text.data() + text.size();
-        const auto low = std::from_chars(text.data(), end, tolerance.low_mm);
-        const bool comma = low.ec == std::errc() && low.ptr != end && *low.ptr == ',';
-        const auto high = comma ? std::from_chars(low.ptr + 1, end, tolerance.high_mm) : low;
-        if (!comma || high.ec != std::errc() || high.ptr != end) {
-          throw CLI::ValidationError("--tolerance", fmt::format("found '{}', expected LOW,HIGH in mm, for example "
-                                                                "-0.5,0.5",
-                                                                text));
-        }
-        options.inspect.tolerance = tolerance;
-      },
-      "LOW,HIGH in mm: deviations that the drawing allows; exit code 6 when they are exceeded");
+void add_inspection_options(CLI::App& command, pipeline::Options& options) {
+  constexpr const char* kGroup = "Inspection";
+  command
+      .add_option_function<std::string>(
+          "--tolerance", [&options](const std::string& text) { take_tolerance(text, options); },
+          "LOW,HIGH in mm: deviations that the drawing allows, or a CSV or JSON file with one per CAD face or box; "
+          "exit "
+          "code 6 unless the verdict is pass")
+      ->group(kGroup);
+  command
+      .add_option_function<std::string>(
+          "--alignment",
+          [&options](const std::string& name) {
+            options.alignment = name == "best-fit" ? pipeline::Alignment::best_fit : pipeline::Alignment::as_refined;
+          },
+          "What deviations are measured from: as-refined (as it is) or best-fit (one rigid motion, robust, no scale)")
+      ->check(CLI::IsMember({"as-refined", "best-fit"}))
+      ->default_str("as-refined")
+      ->group(kGroup);
+  command
+      .add_option("--align-on", options.align_on,
+                  "Best fit onto: all, faces:N,N,... (CAD faces), or a CSV file of points on the model")
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--reference", options.reference,
+                  "CSV of check points measured by other means, in the model frame: [name,]x,y,z[,sigma] in mm")
+      ->group(kGroup);
+  command.add_flag("--views", options.views, "Also write views/*.png")->group(kGroup);
+  command.add_flag("--colour-steps", options.colour_steps, "Pictures in discrete colours")->group(kGroup);
 }
 
 void add_common_options(CLI::App& command, Shell& shell, bool has_output) {

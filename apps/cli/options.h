@@ -20,8 +20,8 @@ void add_pipeline_options(CLI::App& command, pipeline::Options& options, std::in
 /// An option for a unit of length by its name.
 void add_unit_option(CLI::App& command, const std::string& name, io::Unit& unit, const std::string& help);
 
-/// --tolerance LOW,HIGH.
-void add_tolerance_option(CLI::App& command, pipeline::Options& options);
+/// --tolerance, --alignment, --align-on, --reference, --views, --colour-steps.
+void add_inspection_options(CLI::App& command, pipeline::Options& options);
 
 /// "--angle-bins" for the field `angle_bins`.
 [[nodiscard]] std::string flag_of(const std::string& field);

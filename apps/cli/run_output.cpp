@@ -41,10 +41,28 @@ std::string joint_lines(const io::RunRecord& record) {
         "the surface scanned\n",
         deviation.mean, deviation.sigma, deviation.p95, 100.0 * deviation.coverage);
     if (deviation.in_tolerance) {
-      text += fmt::format("tolerance: {:.2f} % of the scanned surface within\n", 100.0 * *deviation.in_tolerance);
+      text += fmt::format("tolerance: {}, {:.2f} % of the scanned surface within\n", deviation.verdict,
+                          100.0 * *deviation.in_tolerance);
     }
   }
   return text;
+}
+
+/// Without what cannot change the result: where it is written, how fast, and what is said on the way.
+std::vector<std::string> telling_arguments(const std::vector<std::string>& arguments) {
+  constexpr std::string_view kWithValue[] = {"-o", "--output", "--threads", "--memory"};
+  constexpr std::string_view kAlone[] = {"-q", "--quiet", "--json", "--force"};
+  std::vector<std::string> telling;
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string_view name = std::string_view(arguments[i]).substr(0, arguments[i].find('='));
+    if (std::ranges::find(kAlone, name) != std::end(kAlone)) continue;
+    if (std::ranges::find(kWithValue, name) == std::end(kWithValue)) {
+      telling.push_back(arguments[i]);
+    } else if (name.size() == arguments[i].size()) {
+      ++i;  // its value is the next one
+    }
+  }
+  return telling;
 }
 
 void limit_memory(double gigabytes) {
@@ -62,23 +80,26 @@ std::string summary_of(const io::RunRecord& record, const std::string& folder) {
   for (const io::ScanRecord& scan : record.scans) text += line_of(scan);
   text += fmt::format("{} of {} scans accepted\n", count_of(record, io::ScanStatus::accepted), record.scans.size());
   text += joint_lines(record);
+  if (record.deviation) {
+    text += fmt::format("report: {}\n", (std::filesystem::path(folder) / "report.html").string());
+  }
   text += fmt::format("result: {}\n", (std::filesystem::path(folder) / "result.json").string());
   return text;
 }
 
-int exit_code_of(const io::RunRecord& record, const pipeline::Options& options) {
+int exit_code_of(const io::RunRecord& record) {
   using enum io::ScanStatus;
   if (!record.scans.empty() && count_of(record, failed) == record.scans.size()) return kNoReadableInput;
   if (count_of(record, accepted) == 0) return kNotDone;
   if (count_of(record, ambiguous) > 0 || count_of(record, disconnected) > 0) return kAmbiguousOrInPieces;
-  const bool measured = record.deviation && record.deviation->in_tolerance;
-  if (measured && *record.deviation->in_tolerance < options.inspect.required_share) return kOutOfTolerance;
-  return kDone;
+  const bool judged = record.deviation && !record.deviation->verdict.empty();
+  return judged && record.deviation->verdict != "pass" ? kOutOfTolerance : kDone;
 }
 
 pipeline::Output output_of(const std::string& folder, Shell& shell) {
   return {folder, shell.common.force,
-          [&shell](std::string_view stage, std::string_view scan) { shell.show_stage(stage, scan); }};
+          [&shell](std::string_view stage, std::string_view scan) { shell.show_stage(stage, scan); },
+          telling_arguments(shell.arguments)};
 }
 
 void run_on_call(CLI::App& command, Shell& shell, std::function<Result<int>()> work) {

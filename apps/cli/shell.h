@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/result.h"
@@ -38,6 +39,7 @@ class Shell {
   explicit Shell(std::stop_token stop);
 
   CommonOptions common;
+  std::vector<std::string> arguments;  ///< all that was typed, options of --config put in
 
   /// Threads, interruption, warnings and progress as the user wants them.
   [[nodiscard]] Context context();

@@ -2,15 +2,18 @@
 #include "asbuilt/pipeline.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/pipeline/collect_runs.h"
+#include "asbuilt/pipeline/inspection_inputs.h"
 #include "asbuilt/pipeline/joint_half.h"
 #include "asbuilt/pipeline/load_model.h"
 #include "asbuilt/pipeline/measured_cloud.h"
 #include "asbuilt/pipeline/report.h"
 #include "asbuilt/pipeline/run_folder.h"
 #include "asbuilt/pipeline/scan_half.h"
+#include "asbuilt/report/report.h"
 
 // The whole method, a stage a line. The stages of one scan are in pipeline/judge_scan.cpp (Sec. 3.1), those of all
 // scans together in pipeline/joint_half.cpp (Sec. 3.2 and after).
@@ -21,6 +24,7 @@ namespace {
 Result<RunFolder> open(const Output& output, std::string_view command, const Context& context) {
   ASBUILT_TRY(folder, RunFolder::open(output.folder, command, output.force, context.arena().threads()));
   folder.on_stage = output.on_stage;
+  folder.arguments = output.arguments;
   return std::move(folder);
 }
 
@@ -43,11 +47,12 @@ Result<io::RunRecord> reconstruct(const std::string& model_path, std::span<const
                                   const Options& chosen, const Output& output, const Context& context) {
   ASBUILT_CHECK(chosen.validate());
   const Options options = with_paper_mode_applied(chosen);
+  ASBUILT_TRY(inputs, inspection_inputs(options));
   ASBUILT_TRY(folder, open(output, "reconstruct", context));
   ASBUILT_TRY(model, prepared(model_path, options, folder, context));
   ASBUILT_TRY(record, detect_scans(model, scan_paths, options, folder, context));
   record.options = merged(std::move(record.options), recorded(options, {Half::joint}));
-  ASBUILT_CHECK(register_scans(model, options, folder, record, context));
+  ASBUILT_CHECK(register_scans(model, options, inputs, folder, record, context));
   ASBUILT_CHECK(folder.finish(record));
   return std::move(record);
 }
@@ -68,6 +73,7 @@ Result<io::RunRecord> register_runs(std::span<const std::string> run_folders,
                                     const std::optional<std::string>& model_path, const Options& chosen,
                                     const Output& output, const Context& context) {
   ASBUILT_CHECK(chosen.validate());
+  ASBUILT_TRY(inputs, inspection_inputs(chosen));
   ASBUILT_TRY(folder, open(output, "register", context));
   ASBUILT_TRY(record, collect_runs(run_folders, chosen, folder));
   ASBUILT_TRY(options, joint_options(chosen, record));
@@ -75,7 +81,7 @@ Result<io::RunRecord> register_runs(std::span<const std::string> run_folders,
   ASBUILT_CHECK(check_same_model(model, record));
   record.options = merged(std::move(record.options), recorded(options, {Half::joint}));
   record.options = merged(std::move(record.options), choices_about_scans(chosen));
-  ASBUILT_CHECK(register_scans(model, options, folder, record, context));
+  ASBUILT_CHECK(register_scans(model, options, inputs, folder, record, context));
   ASBUILT_CHECK(folder.finish(record));
   return std::move(record);
 }
@@ -83,14 +89,40 @@ Result<io::RunRecord> register_runs(std::span<const std::string> run_folders,
 Result<inspect::DeviationReport> inspect_cloud(const std::string& model_path, const std::string& cloud_path,
                                                const Options& options, const Output& output, const Context& context) {
   ASBUILT_CHECK(options.validate());
+  ASBUILT_TRY(inputs, inspection_inputs(options));
   ASBUILT_TRY(folder, open(output, "inspect", context));
   ASBUILT_TRY(model, prepared(model_path, options, folder, context));
-  ASBUILT_TRY(cloud, measured_cloud(cloud_path, model, options, context));
-  ASBUILT_TRY(deviations, inspect::inspect(cloud, model.prepared, options.inspect, context));
-  ASBUILT_CHECK(write_deviations(folder.file("deviation.ply"), cloud, deviations.deviation_mm));
-  ASBUILT_CHECK(write_report(folder.file("report.json"), record_of_model(model), deviations, options.inspect));
+  std::optional<MeasuredCloud> measured;
+  {
+    const auto timed = folder.stage("read");
+    ASBUILT_TRY(read, measured_cloud(cloud_path, model, options, context));
+    measured = std::move(read);
+  }
+  std::optional<inspect::DeviationReport> deviations;
+  {
+    const auto timed = folder.stage("inspect");
+    ASBUILT_TRY(found, inspect::inspect(measured->cloud, model.prepared, inputs.options, context));
+    deviations = std::move(found);
+  }
+  {
+    const auto timed = folder.stage("report");
+    io::RunRecord record = record_of_model(model);
+    record.options = recorded_inspection(options);
+    report::ReportInput input{folder.command(), folder.arguments, record, model.prepared, *deviations, inputs.options};
+    input.points = measured->cloud.size();
+    input.measured = measured->file;
+    input.tolerance_file = inputs.tolerance_file;
+    input.reference_file = inputs.reference_file;
+    input.cloud_file = "deviation.ply";
+    input.views = options.views;
+    input.steps = options.colour_steps;
+    const report::ColourMap colours = report::colours_of(input);
+    const auto path = folder.file("deviation.ply");
+    ASBUILT_CHECK(write_deviations(path, measured->cloud, deviations->deviation_mm, colours));
+    ASBUILT_CHECK(report::write_report(folder.file(""), input, context));
+  }
   ASBUILT_CHECK(folder.finish());
-  return std::move(deviations);
+  return std::move(*deviations);
 }
 
 }  // namespace asbuilt::pipeline

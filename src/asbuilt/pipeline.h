@@ -21,6 +21,8 @@ struct Output {
   std::filesystem::path folder;
   bool force = false;  ///< write into a folder that is not an earlier run of the same command, and start anew
   std::function<void(std::string_view stage, std::string_view scan)> on_stage;  ///< told as stages begin; may be empty
+  /// The command as typed, for the report: without what cannot change the result (output, threads, --quiet ...).
+  std::vector<std::string> arguments = {};
 };
 
 /// The whole method: scans in, the part as built and its deviations out. The folder gets what architecture.md, section
@@ -43,7 +45,7 @@ struct Output {
                                                   const std::optional<std::string>& model_path, const Options& options,
                                                   const Output& output, const Context& context);
 
-/// Deviations of one cloud or mesh that is in the model frame; writes report.json and deviation.ply.
+/// Deviations of one cloud or mesh that is in the model frame; writes the report (docs/report.md) and deviation.ply.
 [[nodiscard]] Result<inspect::DeviationReport> inspect_cloud(const std::string& model_path,
                                                              const std::string& cloud_path, const Options& options,
                                                              const Output& output, const Context& context);

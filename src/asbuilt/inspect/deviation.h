@@ -1,28 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/result.h"
+#include "asbuilt/inspect/alignment.h"
+#include "asbuilt/inspect/faces.h"
+#include "asbuilt/inspect/measurement.h"
+#include "asbuilt/inspect/reference.h"
+#include "asbuilt/inspect/regions.h"
+#include "asbuilt/inspect/spots.h"
+#include "asbuilt/inspect/statistics.h"
+#include "asbuilt/inspect/tolerance.h"
 #include "asbuilt/model/prepared_model.h"
 
 namespace asbuilt::inspect {
 
-/// Deviations that the drawing allows, both ends included.
-struct Tolerance {
-  double low_mm = 0.0, high_mm = 0.0;
-};
-
 struct InspectOptions {
   double max_distance_ratio = 0.05;  ///< points further than this share of the diameter are not the part's (our value)
   double required_share = 0.99;      ///< share of the scanned surface that must lie within the tolerance (our value)
-  std::optional<Tolerance> tolerance;
+  double minimum_coverage = 0.5;     ///< less of a face or part scanned is not enough data (our value)
+  double significance = 3.0;         ///< standard errors from which a deviation is not noise (99.7 %)
+  double reference_distance_mm =
+      0.0;  ///< how far about a check point the surface is looked for; 0: 1 % of the diameter
 
+  std::optional<Tolerance> tolerance;  ///< of all faces that no row of `tolerances` names
+  ToleranceTable tolerances = {};           ///< one per CAD face or box
+  AlignmentOptions alignment = {};
+  std::vector<ReferencePoint> reference = {};  ///< check points
+
+  [[nodiscard]] bool has_tolerance() const {
+    return tolerance.has_value() || tolerances.others.has_value() || !tolerances.rows.empty();
+  }
   [[nodiscard]] Result<void> validate() const;
 };
 
@@ -30,42 +47,51 @@ template <class Visitor>
 void for_each_field(InspectOptions& options, Visitor&& field) {
   field("max_distance_ratio", options.max_distance_ratio, "distance / diameter beyond which a point is not the part's");
   field("required_share", options.required_share, "share of the scanned surface that the tolerance must hold");
+  field("minimum_coverage", options.minimum_coverage, "share of a face or part below which it is not enough data");
+  field("significance", options.significance, "standard errors from which a deviation is not noise");
+  field("reference_distance", options.reference_distance_mm,
+        "how far about a check point the surface is looked for, mm (0: 1 % of the diameter)");
 }
-
-/// Statistics of signed deviations (users.md, section 2), mm. All zero when count is.
-struct DeviationStatistics {
-  std::size_t count = 0;
-  double min = 0, max = 0, mean = 0, mean_absolute = 0, rms = 0;
-  double sigma = 0;                             ///< standard deviation about the mean
-  double mean_positive = 0, mean_negative = 0;  ///< of the deviations > 0 and < 0; 0 when there are none
-  double median = 0, p95 = 0, p99 = 0;          ///< p95, p99 of absolute deviations
-  std::optional<double> in_tolerance, over_tolerance, under_tolerance;  ///< shares, when a tolerance is given
-};
-
-/// Quantiles are of the sorted values with linear interpolation between ranks. Values must be finite.
-[[nodiscard]] DeviationStatistics statistics(std::vector<double> deviations_mm,
-                                             const std::optional<Tolerance>& tolerance);
 
 struct DeviationReport {
   std::vector<float> deviation_mm;  ///< one per point of the cloud; positive: outside the material
   std::size_t far_points = 0;       ///< beyond max_distance_ratio; in no statistic
+  std::size_t on_open_edges = 0;    ///< points nearest to the border of an open model: their sign means nothing
+  Alignment alignment;              ///< applied before anything was measured
   DeviationStatistics over_points;
   DeviationStatistics over_area;  ///< over even samples of the CAD surface that were scanned
   double coverage = 0.0;          ///< share of the CAD surface that was scanned
+  double area_mm2 = 0.0;          ///< of the CAD surface
+  double noise_sigma_mm = 0.0;    ///< of a single point, from the scatter of neighbours; 0: unknown
+  double spacing_mm = 0.0;        ///< of the cloud, median
 
-  /// Whether the tolerance holds on the required share of the scanned surface; nothing without a tolerance, and false
-  /// when nothing was scanned.
-  [[nodiscard]] std::optional<bool> within_tolerance(const InspectOptions& options) const;
+  std::vector<Spot> spots;                   ///< one per dense sample of the model
+  std::vector<std::uint32_t> face_of_spot;   ///< index into `faces`
+  std::vector<std::int32_t> region_of_spot;  ///< index into `regions`, -1: none
+  FaceMap face_map;
+  std::vector<SurfacePart> faces, boxes;
+  std::vector<Eigen::AlignedBox3d> box_extents;  ///< of `boxes`, model frame
+  std::vector<Region> regions;
+  Tolerance region_limits;         ///< what regions exceed where there is no tolerance
+  double significant_share = 0.0;  ///< of the scanned area: deviations that are not noise
+  std::optional<ReferenceReport> reference;
+  std::optional<Verdict> verdict;            ///< absent without a tolerance
+  std::shared_ptr<const SpotFinder> finder;  ///< answers what was measured at other places, by the same rules
+
+  /// What holds at a place of a face: that of the box it lies in, of its face, or of all others; null: nothing.
+  [[nodiscard]] const Tolerance* tolerance_at(std::uint32_t face, const Eigen::Vector3f& position) const;
 };
 
 /// How far a cloud lies from the CAD surface.
 ///
 /// A point's deviation is the exact signed distance to the nearest triangle, whatever the point's normal. For the
-/// figures over area, each even sample of the skin takes the median deviation of the points whose nearest surface point
-/// lies next to it on its own side (their own normals, if there are any, must agree); a sample without such points was
-/// not scanned. "Next to" is one sample spacing, or one and a half point spacings where the cloud is coarser.
+/// figures over area, each even sample of the skin takes the mean deviation of the points about it on its own side
+/// (SpotFinder); a sample without such points was not scanned.
 ///
-/// Errors: invalid_argument for bad options, not_possible for a model without samples.
+/// Errors: invalid_argument for bad options, not_possible for a model without samples or an alignment without points,
+/// cancelled.
+[[nodiscard]] Result<DeviationReport> inspect(const Measurement& measurement, const model::PreparedModel& model,
+                                              const InspectOptions& options, const Context& context);
 [[nodiscard]] Result<DeviationReport> inspect(const PointCloud& cloud_in_model, const model::PreparedModel& model,
                                               const InspectOptions& options, const Context& context);
 

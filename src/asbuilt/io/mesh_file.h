@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -48,5 +50,14 @@ struct ModelFile {
 
 /// Binary little-endian PLY, written whole or not at all. CAD faces, where known, become the property `cad_face`.
 [[nodiscard]] Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh);
+
+/// What a mesh can carry at its vertices; each empty or one per vertex.
+struct VertexValues {
+  std::vector<float> deviation_mm;
+  std::vector<std::array<std::uint8_t, 3>> colours;
+};
+/// The same with the properties `deviation`, `red`, `green` and `blue`, as far as they are given.
+[[nodiscard]] Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
+                                          const VertexValues& values);
 
 }  // namespace asbuilt::io

@@ -81,22 +81,35 @@ Result<void> write_ply(const std::filesystem::path& path, std::span<const PlyCol
 }
 
 Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  return write_mesh_ply(path, mesh, {});
+}
+
+Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const VertexValues& values) {
   const bool has_faces = !mesh.cad_faces.empty();
-  constexpr std::size_t kVertexBytes = 3 * sizeof(double), kCornerBytes = sizeof(std::int32_t);
+  const bool has_deviation = !values.deviation_mm.empty(), has_colours = !values.colours.empty();
+  ASBUILT_EXPECT(!has_deviation || values.deviation_mm.size() == mesh.vertices.size(), "a deviation per vertex");
+  ASBUILT_EXPECT(!has_colours || values.colours.size() == mesh.vertices.size(), "a colour per vertex");
+  constexpr std::size_t kCornerBytes = sizeof(std::int32_t);
+  const std::size_t vertex_bytes = 3 * sizeof(double) + (has_deviation ? sizeof(float) : 0) + (has_colours ? 3 : 0);
   const std::size_t face_bytes = 1 + (has_faces ? 4 : 3) * kCornerBytes;
   std::string content = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
       "z\n"
-      "element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
-      mesh.vertices.size(), mesh.triangles.size(), has_faces ? "property int cad_face\n" : "");
+      "{}{}element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
+      mesh.vertices.size(), has_deviation ? "property float deviation\n" : "",
+      has_colours ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "", mesh.triangles.size(),
+      has_faces ? "property int cad_face\n" : "");
   std::size_t target = content.size();
-  content.resize(target + mesh.vertices.size() * kVertexBytes + mesh.triangles.size() * face_bytes);
+  content.resize(target + mesh.vertices.size() * vertex_bytes + mesh.triangles.size() * face_bytes);
   const auto put = [&](auto value) {
     store_little_endian(value, content.data() + target);
     target += sizeof(value);
   };
-  for (const Eigen::Vector3d& vertex : mesh.vertices) {
-    for (int axis = 0; axis < 3; ++axis) put(vertex[axis]);
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) put(mesh.vertices[i][axis]);
+    if (has_deviation) put(values.deviation_mm[i]);
+    if (!has_colours) continue;
+    for (const std::uint8_t channel : values.colours[i]) put(channel);
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     put(std::uint8_t{3});

@@ -145,7 +145,8 @@ Json json_of(const DeviationRecord& deviation) {
           {"rms", json_number(deviation.rms)},
           {"p95", json_number(deviation.p95)},
           {"in_tolerance", deviation.in_tolerance ? json_number(*deviation.in_tolerance) : Json(nullptr)},
-          {"coverage", json_number(deviation.coverage)}};
+          {"coverage", json_number(deviation.coverage)},
+          {"verdict", deviation.verdict.empty() ? Json(nullptr) : Json(deviation.verdict)}};
 }
 
 // ---- reading: nlohmann's exceptions name the wrong type; they are caught at the door and become an Error.
@@ -294,8 +295,11 @@ DeviationRecord deviation_of(const Json& json) {
                             number_at(json, "rms"),
                             number_at(json, "p95"),
                             std::nullopt,
-                            number_at(json, "coverage")};
+                            number_at(json, "coverage"),
+                            {}};
   if (!json.at("in_tolerance").is_null()) deviation.in_tolerance = number_at(json, "in_tolerance");
+  // Results of earlier versions have none.
+  if (json.contains("verdict") && json["verdict"].is_string()) deviation.verdict = json["verdict"].get<std::string>();
   return deviation;
 }
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "asbuilt/fuse/mesh.h"
-#include "asbuilt/io/mesh_file.h"
 #include "asbuilt/pipeline/posed_scans.h"
 #include "asbuilt/pipeline/report.h"
+#include "asbuilt/report/report.h"
 
 namespace asbuilt::pipeline {
 namespace {
@@ -174,27 +174,70 @@ Result<fuse::Reconstruction> fused(const RefinedComponent& largest, std::vector<
   return fuse::fuse(segments, options.fuse, context);
 }
 
-/// mesh.ply, if it is wanted. A cloud that makes no surface is worth a warning; the rest of the result stands.
-Result<void> write_mesh(const fuse::Reconstruction& reconstruction, const Options& options, RunFolder& folder,
-                        const Context& context) {
+/// The surface mesh, if it is wanted. A cloud that makes no surface is worth a warning; the rest of the result stands.
+Result<std::optional<TriangleMesh>> surface_of(const fuse::Reconstruction& reconstruction, const Options& options,
+                                               RunFolder& folder, const Context& context) {
   folder.remove("mesh.ply");
-  if (!options.mesh) return {};
+  if (!options.mesh) return std::nullopt;
   const auto timed = folder.stage("mesh");
-  const auto mesh = fuse::surface_mesh(reconstruction, options.surface_mesh, context);
-  if (mesh) return io::write_mesh_ply(folder.file("mesh.ply"), *mesh);
+  auto mesh = fuse::surface_mesh(reconstruction, options.surface_mesh, context);
+  if (mesh) return std::optional(std::move(*mesh));
   if (mesh.error().code != ErrorCode::not_possible) return tl::unexpected(mesh.error());
   context.warn("no mesh.ply: " + mesh.error().message);
-  return {};
+  return std::nullopt;
+}
+
+/// How well the places of the scans in the reconstruction are known.
+std::vector<inspect::ScanPose> poses_of(const io::RunRecord& record) {
+  std::vector<inspect::ScanPose> poses;
+  for (std::size_t i = 0; i < record.scans.size(); ++i) {
+    if (record.scans[i].covariance) poses.push_back({static_cast<int>(i), *record.scans[i].covariance});
+  }
+  return poses;
+}
+
+/// Deviations, everything that shows them, and their figures in the record.
+Result<void> inspect_and_report(const fuse::Reconstruction& reconstruction, const std::optional<TriangleMesh>& mesh,
+                                const LoadedModel& model, const Options& options, const InspectionInputs& inputs,
+                                RunFolder& folder, io::RunRecord& record, const Context& context) {
+  const std::vector<inspect::ScanPose> poses = poses_of(record);
+  const inspect::Measurement measurement{reconstruction.cloud, reconstruction.scan, reconstruction.support,
+                                         reconstruction.sigma_mm, poses};
+  std::optional<inspect::DeviationReport> deviations;
+  {
+    const auto timed = folder.stage("inspect");
+    ASBUILT_TRY(found, inspect::inspect(measurement, model.prepared, inputs.options, context));
+    deviations = std::move(found);
+  }
+  record.deviation = recorded_deviation(*deviations);
+  const auto timed = folder.stage("report");
+  report::ReportInput input{folder.command(), folder.arguments, record, model.prepared, *deviations, inputs.options};
+  input.points = reconstruction.cloud.size();
+  input.tolerance_file = inputs.tolerance_file;
+  input.reference_file = inputs.reference_file;
+  input.cloud_file = "reconstruction.ply";
+  if (mesh) input.mesh_file = "mesh.ply";
+  input.views = options.views;
+  input.steps = options.colour_steps;
+  const report::ColourMap colours = report::colours_of(input);
+  if (mesh) {
+    const auto path = folder.file("mesh.ply");
+    ASBUILT_CHECK(write_coloured_mesh(path, *mesh, model.prepared, *deviations, colours, context));
+  }
+  const auto path = folder.file("reconstruction.ply");
+  ASBUILT_CHECK(write_reconstruction(path, reconstruction, deviations->deviation_mm, colours));
+  return report::write_report(folder.file(""), input, context);
 }
 
 }  // namespace
 
-Result<void> register_scans(const LoadedModel& model, const Options& options, RunFolder& folder, io::RunRecord& record,
-                            const Context& context) {
+Result<void> register_scans(const LoadedModel& model, const Options& options, const InspectionInputs& inputs,
+                            RunFolder& folder, io::RunRecord& record, const Context& context) {
   ASBUILT_TRY(scans, load_posed_scans(record, folder));
   if (scans.empty()) {
     record.state = io::RunState::failed;
-    for (const char* stale : {"reconstruction.ply", "mesh.ply", "report.json"}) folder.remove(stale);
+    for (const char* stale : {"reconstruction.ply", "mesh.ply"}) folder.remove(stale);
+    for (const std::string& stale : report::report_files()) folder.remove(stale);
     return {};
   }
   ASBUILT_TRY(registration, registered(scans, model, options, folder, record, context));
@@ -211,13 +254,9 @@ Result<void> register_scans(const LoadedModel& model, const Options& options, Ru
     ASBUILT_TRY(fused_scans, fused(registration.components.front(), scans, options, context));
     reconstruction = std::move(fused_scans);
   }
-  ASBUILT_CHECK(write_mesh(reconstruction, options, folder, context));
-  const auto timed = folder.stage("inspect");
-  ASBUILT_TRY(deviations, inspect::inspect(reconstruction.cloud, model.prepared, options.inspect, context));
-  record.deviation = recorded_deviation(deviations);
+  ASBUILT_TRY(mesh, surface_of(reconstruction, options, folder, context));
   record.state = io::RunState::complete;
-  ASBUILT_CHECK(write_reconstruction(folder.file("reconstruction.ply"), reconstruction, deviations.deviation_mm));
-  return write_report(folder.file("report.json"), record, deviations, options.inspect);
+  return inspect_and_report(reconstruction, mesh, model, options, inputs, folder, record, context);
 }
 
 }  // namespace asbuilt::pipeline

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/io/file.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/pipeline/pipeline_version.h"
@@ -12,8 +13,16 @@
 namespace asbuilt::pipeline {
 namespace {
 
-Result<PointCloud> points_of(const std::string& path, const Options& options, const Context& context) {
-  ASBUILT_TRY(files, io::read_scans(path, scan_reading(options)));
+/// Whether a file can be a mesh; a PLY file without the element "face" need not be read twice to find out.
+bool has_faces(const std::string& path, std::string_view content) {
+  if (!content.starts_with("ply")) return io::is_model_name(path) || content.size() < (std::size_t{1} << 26);
+  const std::string_view header = content.substr(0, content.find("end_header"));
+  return header.find("element face") != std::string_view::npos;
+}
+
+Result<PointCloud> points_of(const std::string& path, std::string_view content, const Options& options,
+                             const Context& context) {
+  ASBUILT_TRY(files, io::scans_in(path, content, scan_reading(options)));
   PointCloud all;
   for (const io::ScanFile& file : files) {
     const PointCloud cloud = scan::sanitise(file.cloud, context).cloud;
@@ -28,12 +37,22 @@ Result<PointCloud> points_of(const std::string& path, const Options& options, co
 
 }  // namespace
 
-Result<PointCloud> measured_cloud(const std::string& path, const LoadedModel& model, const Options& options,
-                                  const Context& context) {
+Result<MeasuredCloud> measured_cloud(const std::string& path, const LoadedModel& model, const Options& options,
+                                     const Context& context) {
+  MeasuredCloud measured;
+  ASBUILT_TRY(content, io::FileContent::open(path));
+  measured.file = {path, io::sha256(content.view())};
   // A file with faces is a surface: its vertices alone would say nothing of a large triangle.
-  const auto mesh = io::read_mesh(path, options.scan_unit);
-  if (!mesh) return points_of(path, options, context);
-  return model::even_samples(*mesh, median_spacing(model.prepared.dense_samples.positions), options.seed, context);
+  if (has_faces(path, content.view())) {
+    if (const auto mesh = io::read_mesh(path, options.scan_unit)) {
+      const double spacing = median_spacing(model.prepared.dense_samples.positions);
+      measured.cloud = model::even_samples(*mesh, spacing, options.seed, context);
+      return measured;
+    }
+  }
+  ASBUILT_TRY(points, points_of(path, content.view(), options, context));
+  measured.cloud = std::move(points);
+  return measured;
 }
 
 io::RunRecord record_of_model(const LoadedModel& model) {

@@ -8,13 +8,19 @@
 #include "asbuilt/core/result.h"
 #include "asbuilt/pipeline/load_model.h"
 #include "asbuilt/pipeline/options.h"
+#include "asbuilt/report/report.h"
 
 namespace asbuilt::pipeline {
 
-/// What `asbuilt inspect` measures: the points of a cloud, or even samples of a mesh, in the model frame; mm.
-/// Errors: unreadable_input.
-[[nodiscard]] Result<PointCloud> measured_cloud(const std::string& path, const LoadedModel& model,
-                                                const Options& options, const Context& context);
+/// What `asbuilt inspect` measures.
+struct MeasuredCloud {
+  PointCloud cloud;  ///< in the model frame, mm
+  report::InputFile file;
+};
+
+/// The points of a cloud, or even samples of a mesh. Errors: unreadable_input.
+[[nodiscard]] Result<MeasuredCloud> measured_cloud(const std::string& path, const LoadedModel& model,
+                                                   const Options& options, const Context& context);
 
 /// A record that knows its model and version and no scans.
 [[nodiscard]] io::RunRecord record_of_model(const LoadedModel& model);

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::string_view kGaugeNames[] = {"best_fit", "fixed"};
 constexpr std::string_view kInstancesNames[] = {"one", "all"};
+constexpr std::string_view kAlignmentNames[] = {"as_refined", "best_fit"};
 
 io::OptionValue value_of(bool value) { return value; }
 io::OptionValue value_of(int value) { return std::int64_t{value}; }
@@ -152,6 +153,10 @@ io::Options recorded(const Options& options, std::initializer_list<Half> halves)
                  fmt::format("{}", options.inspect.tolerance->high_mm)};
   }
   record.emplace_back("tolerance", tolerance);
+  record.emplace_back("tolerance_file", options.tolerance_file);
+  record.emplace_back("reference", options.reference);
+  record.emplace_back("alignment", std::string(kAlignmentNames[static_cast<int>(options.alignment)]));
+  record.emplace_back("align_on", options.align_on);
   for_each_stage_field(fields, [&](Half half, const std::string& name, auto& value, std::string_view) {
     if (half == Half::joint) record.emplace_back(name, value_of(value));
   });
@@ -185,6 +190,17 @@ Result<void> take_over(Options& options, const io::Options& record) {
     if (outcome) outcome = assign(name, value);
   });
   return outcome;
+}
+
+io::Options recorded_inspection(const Options& options) {
+  constexpr std::string_view kOwn[] = {"tolerance", "tolerance_file", "reference", "alignment", "align_on"};
+  io::Options record = recorded(options, {Half::model});
+  record.emplace_back("scan_unit", unit_name(options.scan_unit));
+  for (auto& option : recorded(options, {Half::joint})) {
+    const bool is_own = option.first.starts_with("inspect_") || std::ranges::find(kOwn, option.first) != std::end(kOwn);
+    if (is_own) record.push_back(std::move(option));
+  }
+  return record;
 }
 
 io::Options merged(io::Options earlier, const io::Options& later) {

@@ -30,6 +30,9 @@ enum class Gauge { best_fit, fixed };
 /// detection of its own; they are then taken to be the same casting, or as good as.
 enum class Instances { one, all };
 
+/// What deviations are measured from: the refined (or given) frame, or a best fit of the cloud to the CAD.
+enum class Alignment { as_refined, best_fit };
+
 /// Everything a user can choose; the stages' own options and what lies between them.
 struct Options {
   io::Unit model_unit = io::Unit::stated, scan_unit = io::Unit::stated;
@@ -45,6 +48,12 @@ struct Options {
   bool paper_mode = false;  ///< exactly the published method, in every stage
   bool mesh = false;        ///< a surface mesh beside the cloud
   Gauge gauge = Gauge::best_fit;
+  std::string tolerance_file;  ///< one tolerance per CAD face or box (docs/inspect.md); empty: none
+  std::string reference;       ///< file of check points; empty: none
+  Alignment alignment = Alignment::as_refined;
+  std::string align_on = "all";  ///< best fit: all, faces:N,N,... or a file of points on the model
+  bool views = false;            ///< pictures beside the report
+  bool colour_steps = false;     ///< pictures in discrete colours
 
   model::ModelOptions model;
   scan::ScanOptions scan;
@@ -93,6 +102,9 @@ void for_each_stage_field(Options& options, Visitor&& field) {
 /// The options of these halves as result.json lists them. Nothing that may differ without changing the result (threads,
 /// output folder) is among them.
 [[nodiscard]] io::Options recorded(const Options& options, std::initializer_list<Half> halves);
+
+/// The same for `inspect` alone.
+[[nodiscard]] io::Options recorded_inspection(const Options& options);
 
 /// Takes over what `recorded` wrote. Errors: invalid_argument for a value of the wrong kind.
 [[nodiscard]] Result<void> take_over(Options& options, const io::Options& record);

@@ -6,9 +6,11 @@
 
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/result.h"
+#include "asbuilt/core/triangle_mesh.h"
 #include "asbuilt/fuse/fuse.h"
 #include "asbuilt/inspect/deviation.h"
 #include "asbuilt/io/run_record.h"
+#include "asbuilt/report/colours.h"
 
 namespace asbuilt::pipeline {
 
@@ -16,19 +18,19 @@ namespace asbuilt::pipeline {
 /// twice.
 [[nodiscard]] io::DeviationRecord recorded_deviation(const inspect::DeviationReport& deviations);
 
-/// report.json (docs/inspect.md): part, scans, alignment, tolerance and all statistics. `record` gives the model, the
-/// scans and the gauge; for a cloud that was inspected alone it has no scans.
-[[nodiscard]] Result<void> write_report(const std::filesystem::path& path, const io::RunRecord& record,
-                                        const inspect::DeviationReport& deviations,
-                                        const inspect::InspectOptions& options);
-
-/// reconstruction.ply with the columns of the contract.
+/// reconstruction.ply with the columns of the contract, and the colours of the deviations.
 [[nodiscard]] Result<void> write_reconstruction(const std::filesystem::path& path,
                                                 const fuse::Reconstruction& reconstruction,
-                                                std::span<const float> deviation_mm);
+                                                std::span<const float> deviation_mm, const report::ColourMap& colours);
 
-/// A cloud in the model frame with its deviations, for `asbuilt inspect`.
+/// A cloud in the model frame with its deviations and their colours, for `asbuilt inspect`.
 [[nodiscard]] Result<void> write_deviations(const std::filesystem::path& path, const PointCloud& cloud_in_model,
-                                            std::span<const float> deviation_mm);
+                                            std::span<const float> deviation_mm, const report::ColourMap& colours);
+
+/// A mesh in the model frame with the deviation of each vertex, after the alignment of the report, and its colour.
+[[nodiscard]] Result<void> write_coloured_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                                               const model::PreparedModel& model,
+                                               const inspect::DeviationReport& deviations,
+                                               const report::ColourMap& colours, const Context& context);
 
 }  // namespace asbuilt::pipeline

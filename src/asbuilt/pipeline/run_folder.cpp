@@ -134,6 +134,8 @@ Result<RunFolder> RunFolder::open(const fs::path& path, std::string_view command
 
 fs::path RunFolder::file(const fs::path& name) const { return state_->path / name; }
 
+const std::string& RunFolder::command() const { return state_->timing.command; }
+
 Result<std::optional<io::RunRecord>> RunFolder::earlier_run(const io::ModelRecord& model) const {
   if (state_->made || state_->start_anew) return std::nullopt;
   const fs::path file = state_->path / "result.json";

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/result.h"
@@ -30,6 +31,7 @@ class RunFolder {
   ~RunFolder();
 
   [[nodiscard]] std::filesystem::path file(const std::filesystem::path& name) const;
+  [[nodiscard]] const std::string& command() const;  ///< whose folder this is
 
   /// What an earlier run of the same command left, if it was about this model; an error if it was about another.
   [[nodiscard]] Result<std::optional<io::RunRecord>> earlier_run(const io::ModelRecord& model) const;
@@ -58,6 +60,9 @@ class RunFolder {
     std::chrono::steady_clock::time_point begin_;
   };
   [[nodiscard]] Stage stage(std::string_view name, std::string_view scan = {}) { return {*this, name, scan}; }
+
+  /// What the user typed, as far as it can change the result; for the report.
+  std::vector<std::string> arguments;
 
   /// Told at the beginning of every stage.
   std::function<void(std::string_view stage, std::string_view scan)> on_stage;

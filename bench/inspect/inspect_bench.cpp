@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+// Inspection against simulated truth, and a cloud for the comparison of speed. bench/inspect/run calls it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "asbuilt/core/random.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/ply_writer.h"
+#include "asbuilt/pipeline.h"
+#include "asbuilt/simulate/parts.h"
+#include "truth.h"
+
+namespace asbuilt::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One line of points.csv.
+struct MeasuredSpot {
+  Eigen::Vector3d position, normal;
+  bool scanned = false;
+  double deviation = 0.0, error = 0.0;
+};
+
+std::vector<std::string> fields_of(const std::string& line) {
+  std::vector<std::string> fields;
+  std::stringstream stream(line);
+  for (std::string field; std::getline(stream, field, ',');) fields.push_back(field);
+  return fields;
+}
+
+std::vector<MeasuredSpot> read_spots(const fs::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  std::vector<MeasuredSpot> spots;
+  while (std::getline(file, line)) {
+    const auto f = fields_of(line);
+    MeasuredSpot spot;
+    spot.position = {std::stod(f[0]), std::stod(f[1]), std::stod(f[2])};
+    spot.normal = {std::stod(f[3]), std::stod(f[4]), std::stod(f[5])};
+    spot.scanned = !f[6].empty();
+    if (spot.scanned) spot.deviation = std::stod(f[6]);
+    if (spot.scanned && !f[7].empty()) spot.error = std::stod(f[7]);
+    spots.push_back(spot);
+  }
+  return spots;
+}
+
+double sigma_of(const std::vector<double>& values) {
+  double sum = 0.0, squares = 0.0;
+  for (const double v : values) sum += v, squares += v * v;
+  const auto n = static_cast<double>(values.size());
+  return std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)));
+}
+
+struct Options {
+  int scenes = 20, scans = 8, points = 60000;
+  std::uint64_t seed = 1;
+  fs::path folder = "inspect_bench";
+};
+
+/// One scene, the whole way from scans to report, and what truth says of it. Every other scene is undamaged.
+nlohmann::ordered_json run_scene(const Options& options, int number, const Context& context) {
+  simulate::SimulateOptions scene;
+  scene.seed = options.seed + static_cast<std::uint64_t>(number);
+  scene.scans = options.scans;
+  scene.points = options.points;
+  scene.pose = "any";
+  scene.clutter_objects = 0;
+  scene.clutter_low = scene.hidden_high = 0.0;
+  scene.floor = false;
+  const bool damaged = number % 2 == 0;
+  scene.as_built.dents = damaged ? 2 : 0;
+  scene.as_built.bosses = damaged ? 1 : 0;
+  const TriangleMesh cad = simulate::valve_body();
+  const auto simulation = simulate::simulate(cad, scene, context).value();
+  const auto built = simulate::as_built(cad, scene.as_built, scene.seed).value();
+  const double sigma = simulation.noise_sigma_mm;
+  const fs::path folder = options.folder / fmt::format("scene_{:02}", number);
+  fs::remove_all(folder);
+  if (!simulate::write_simulation(folder, simulation)) return {{"error", "the scene was not written"}};
+
+  std::vector<std::string> scans;
+  for (const auto& scan : simulation.scans) scans.push_back((folder / (scan.name + ".ply")).string());
+  pipeline::Options choice;
+  // What the smooth warp does is within tolerance, with one sigma to spare; what was planted is not.
+  const double limit = scene.as_built.warp_ratio * diameter(cad) + sigma;
+  choice.inspect.tolerance = inspect::Tolerance{-limit, limit};
+  const auto record =
+      pipeline::reconstruct((folder / "model.ply").string(), scans, choice, {folder / "result", false, {}, {}}, context);
+  if (!record) return {{"scene", number}, {"error", record.error().message}};
+
+  const InspectionTruth truth(simulation);
+  const auto spots = read_spots(folder / "result/points.csv");
+  std::vector<double> measured, expected, pulls;
+  std::size_t visible = 0, scanned = 0, wrongly = 0, missed = 0;
+  double noise = 0.0;
+  for (const MeasuredSpot& spot : spots) {
+    const bool seen = truth.is_visible(spot.position, spot.normal);
+    visible += seen;
+    scanned += spot.scanned;
+    wrongly += spot.scanned && !seen;
+    missed += !spot.scanned && seen;
+    if (!spot.scanned) continue;
+    const auto deviation = truth.deviation(spot.position, spot.normal);
+    if (!deviation) continue;
+    measured.push_back(spot.deviation);
+    expected.push_back(*deviation);
+    noise += spot.error * spot.error;
+    if (spot.error > 0.0) pulls.push_back(std::abs(spot.deviation - *deviation) / spot.error);
+  }
+  const auto n = static_cast<double>(measured.size());
+  double mean_error = 0.0;
+  for (std::size_t i = 0; i < measured.size(); ++i) mean_error += (measured[i] - expected[i]) / n;
+  const double spread = sigma_of(measured), true_spread = sigma_of(expected);
+  const double without_noise = std::sqrt(std::max(0.0, spread * spread - noise / n));
+  std::ranges::sort(pulls);
+
+  std::ifstream file(folder / "result/report.json");
+  const auto report = nlohmann::json::parse(file);
+  nlohmann::ordered_json bumps = nlohmann::ordered_json::array();
+  std::vector<bool> used(report["regions"].size(), false);
+  for (const simulate::Bump& bump : built.bumps) {
+    // The true extremum about the bump, over the spots that were scanned there.
+    double peak = 0.0;
+    std::size_t around = 0;
+    for (const MeasuredSpot& spot : spots) {
+      if (!spot.scanned || (spot.position - bump.centre_in_model).norm() > 0.7 * bump.radius_mm) continue;
+      ++around;
+      const auto deviation = truth.deviation(spot.position, spot.normal);
+      if (deviation && deviation.value() * bump.height_mm > 0.0 && std::abs(*deviation) > std::abs(peak))
+        peak = *deviation;
+    }
+    nlohmann::ordered_json entry{{"height", bump.height_mm}, {"spots_scanned", around}, {"true_peak", peak}};
+    for (std::size_t r = 0; r < report["regions"].size(); ++r) {
+      const auto at = report["regions"][r]["peak_at"].get<std::vector<double>>();
+      const Eigen::Vector3d place(at[0], at[1], at[2]);
+      const double found = report["regions"][r]["peak"].get<double>();
+      if ((place - bump.centre_in_model).norm() > 1.2 * bump.radius_mm || found * bump.height_mm < 0.0) continue;
+      if (!used[r] && !entry.contains("peak")) {
+        const double error = report["regions"][r]["peak_standard_error"].get<double>();
+        // At the very place where the peak was found.
+        const auto there = truth.deviation(place, bump.normal);
+        entry["peak"] = found;
+        entry["standard_error"] = error;
+        entry["true_at_peak"] = there.value_or(peak);
+        entry["within"] = std::abs(found - peak) <= std::max(0.3 * sigma, 3.0 * error);
+      }
+      used[r] = true;
+    }
+    bumps.push_back(entry);
+  }
+  int invented = 0;
+  for (std::size_t r = 0; r < used.size(); ++r) invented += !used[r] && report["regions"][r]["significant"].get<bool>();
+
+  const auto all = static_cast<double>(spots.size());
+  fs::remove_all(folder);
+  return {{"scene", number},
+          {"sigma", sigma},
+          {"coverage", static_cast<double>(scanned) / all},
+          {"visible", static_cast<double>(visible) / all},
+          {"scanned_unseen", static_cast<double>(wrongly) / all},
+          {"seen_unscanned", static_cast<double>(missed) / all},
+          {"mean_error_in_sigma", mean_error / sigma},
+          {"spread", spread},
+          {"spread_without_noise", without_noise},
+          {"true_spread", true_spread},
+          {"spread_error", without_noise / true_spread - 1.0},
+          {"median_pull", pulls.empty() ? 0.0 : pulls[pulls.size() / 2]},
+          {"bumps", bumps},
+          {"invented", invented}};
+}
+
+int run_scenes(const Options& options) {
+  const Context context;
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  int coverage = 0, mean = 0, spread = 0, bumps = 0, within = 0, found = 0, invented = 0, done = 0;
+  fmt::print("scene  coverage  visible  mean/sigma  spread err  bumps found/within  invented\n");
+  for (int i = 0; i < options.scenes; ++i) {
+    auto scene = run_scene(options, i, context);
+    all.push_back(scene);
+    if (scene.contains("error")) {
+      fmt::print("{:5}  {}\n", i, scene["error"].get<std::string>());
+      continue;
+    }
+    ++done;
+    int here = 0, here_found = 0, here_within = 0;
+    for (const auto& bump : scene["bumps"]) {
+      if (bump["spots_scanned"].get<int>() < 12) continue;  // not seen well enough to be measured
+      ++here;
+      here_found += bump.contains("peak");
+      here_within += bump.value("within", false);
+    }
+    bumps += here, found += here_found, within += here_within, invented += scene["invented"].get<int>();
+    coverage += std::abs(scene["coverage"].get<double>() - scene["visible"].get<double>()) <= 0.01;
+    mean += std::abs(scene["mean_error_in_sigma"].get<double>()) <= 0.1;
+    spread += std::abs(scene["spread_error"].get<double>()) <= 0.05;
+    fmt::print("{:5}  {:8.4f}  {:7.4f}  {:+10.3f}  {:+9.2f} %  {}/{} of {}  {}\n", i, scene["coverage"].get<double>(),
+               scene["visible"].get<double>(), scene["mean_error_in_sigma"].get<double>(),
+               100.0 * scene["spread_error"].get<double>(), here_found, here_within, here,
+               scene["invented"].get<int>());
+    std::fflush(stdout);
+  }
+  fmt::print(
+      "{} scenes: coverage within 1 % in {}, mean within 0.1 sigma in {}, spread within 5 % in {}; of {} bumps {} "
+      "found, {} within max(0.3 sigma, 3 standard errors); {} invented\n",
+      done, coverage, mean, spread, bumps, found, within, invented);
+  std::ofstream(options.folder / "scenes.json") << all.dump(1) << "\n";
+  return 0;
+}
+
+/// The demonstration part with at least 100 000 triangles, and points on it with noise.
+int write_speed_input(const Options& options, std::size_t points) {
+  const TriangleMesh mesh = simulate::valve_body(3.0);
+  fs::create_directories(options.folder);
+  if (!io::write_mesh_ply(options.folder / "model.ply", mesh)) return 1;
+  std::vector<double> up_to;
+  double total = 0.0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) up_to.push_back(total += doubled_area_vector(mesh, i).norm());
+  Random random(options.seed, "speed", 0);
+  std::vector<float> x, y, z;
+  for (std::size_t i = 0; i < points; ++i) {
+    const auto t = static_cast<std::size_t>(std::ranges::upper_bound(up_to, random.uniform() * total) - up_to.begin());
+    const Eigen::Vector3i& corners = mesh.triangles[std::min(t, mesh.triangles.size() - 1)];
+    const double root = std::sqrt(random.uniform()), share = random.uniform();
+    const auto at = [&](int k) { return mesh.vertices[static_cast<std::size_t>(corners[k])]; };
+    const Eigen::Vector3d normal = (at(1) - at(0)).cross(at(2) - at(0)).normalized();
+    const Eigen::Vector3d p = at(0) + root * (1.0 - share) * (at(1) - at(0)) + root * share * (at(2) - at(0)) +
+                              0.1 * random.normal() * normal;
+    x.push_back(static_cast<float>(p.x()));
+    y.push_back(static_cast<float>(p.y()));
+    z.push_back(static_cast<float>(p.z()));
+  }
+  const std::vector<io::PlyColumn> columns{
+      {"x", std::span<const float>(x)}, {"y", std::span<const float>(y)}, {"z", std::span<const float>(z)}};
+  fmt::print("{} triangles, {} points in {}\n", mesh.triangles.size(), points, options.folder.string());
+  return io::write_ply(options.folder / "cloud.ply", columns) ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace asbuilt::bench
+
+int main(int argc, char** argv) {
+  asbuilt::bench::Options options;
+  std::size_t speed_points = 0;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string name = argv[i], value = argv[i + 1];
+    if (name == "--scenes") options.scenes = std::stoi(value);
+    if (name == "--scans") options.scans = std::stoi(value);
+    if (name == "--points") options.points = std::stoi(value);
+    if (name == "--seed") options.seed = std::stoull(value);
+    if (name == "--folder") options.folder = value;
+    if (name == "--speed-input") speed_points = std::stoull(value);
+  }
+  return speed_points > 0 ? asbuilt::bench::write_speed_input(options, speed_points)
+                          : asbuilt::bench::run_scenes(options);
+}
