@@ -12,7 +12,7 @@ export class LiveClient {
 
   url(path, query = {}) {
     const all = new URLSearchParams({ ...query, ...(this.token ? { token: this.token } : {}) });
-    return all.size === 0 || ![...all].length ? path : `${path}?${all}`;
+    return `${path}${`${all}` ? '?' : ''}${all}`;
   }
 
   start() {
