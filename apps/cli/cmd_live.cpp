@@ -81,8 +81,9 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   const Context context = shell.context();
   std::error_code error;
   if (!std::filesystem::is_directory(arguments.watch, error)) {
-    return fail(ErrorCode::unreadable_input,
-                fmt::format("{}: there is no such folder; --watch names the one in which scans arrive", arguments.watch));
+    return fail(
+        ErrorCode::unreadable_input,
+        fmt::format("{}: there is no such folder; --watch names the one in which scans arrive", arguments.watch));
   }
   const std::string output =
       arguments.output.empty() ? (std::filesystem::path(arguments.watch) / "asbuilt-live").string() : arguments.output;
@@ -93,7 +94,8 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   viewer::WatchOptions watch;
   watch.watch = arguments.watch;
   watch.server = arguments.server;
-  watch.idle = std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * std::clamp(arguments.idle_seconds, 0.0, 3600.0)));
+  watch.idle =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * std::clamp(arguments.idle_seconds, 0.0, 3600.0)));
   Console console(shell);
   viewer::WatchReports reports;
   reports.started = [&](const viewer::Server& server) {

@@ -69,8 +69,8 @@ std::optional<Refusal> refusal_of(const RequestHead& head, const AccessRules& ru
                                      ? std::string_view(head.authorization).substr(kBearer.size())
                                      : std::string_view(head.token);
   if (same_secret(given, rules.token)) return std::nullopt;
-  return Refusal{401, given.empty() ? "a token is needed, as ?token=... or as Authorization: Bearer ..."
-                                    : "the token is wrong"};
+  return Refusal{
+      401, given.empty() ? "a token is needed, as ?token=... or as Authorization: Bearer ..." : "the token is wrong"};
 }
 
 std::optional<std::string> objection_to_name(std::string_view file) {

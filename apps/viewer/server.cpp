@@ -10,6 +10,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstring>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -105,7 +106,6 @@ struct Server::Implementation {
       const auto refused = refusal_of(head, rules);
       if (!refused) return httplib::Server::HandlerResponse::Unhandled;
       answer(response, refused->status, refused->reason);
-      response.set_header("Connection", "close");  // a body that nobody reads may follow
       return httplib::Server::HandlerResponse::Handled;
     });
     http.set_error_handler([](const httplib::Request&, httplib::Response& response) {
@@ -132,9 +132,8 @@ struct Server::Implementation {
     http.Get("/state", [this](const httplib::Request&, httplib::Response& response) {
       response.set_content(to_json(*session.state()), kJson);
     });
-    http.Get("/surface", [this](const httplib::Request&, httplib::Response& response) {
-      response.set_content(surface, kJson);
-    });
+    http.Get("/surface",
+             [this](const httplib::Request&, httplib::Response& response) { response.set_content(surface, kJson); });
     http.Get("/surface/values", [this](const httplib::Request&, httplib::Response& response) {
       response.set_content(to_json(*session.values()), kJson);
     });
@@ -165,9 +164,9 @@ struct Server::Implementation {
             lock.unlock();
             state = session.state();
           }
-          const std::string text = state->revision == *sent
-                                       ? std::string(": still here\n\n")
-                                       : fmt::format("event: state\nid: {}\ndata: {}\n\n", state->revision, to_json(*state));
+          const std::string text = state->revision == *sent ? std::string(": still here\n\n")
+                                                            : fmt::format("event: state\nid: {}\ndata: {}\n\n",
+                                                                          state->revision, to_json(*state));
           *sent = state->revision;
           return sink.write(text.data(), text.size());
         },
@@ -202,7 +201,6 @@ struct Server::Implementation {
                    const httplib::ContentReader& content) {
     const auto refuse = [&](int status, const std::string& reason) {
       answer(response, status, reason);
-      response.set_header("Connection", "close");  // the body is not read
     };
     if (request.get_param_value_count("name") != 1) return refuse(400, "give the file's name as ?name=...");
     const std::string file = request.get_param_value("name");
@@ -243,7 +241,9 @@ Result<std::unique_ptr<Server>> Server::start(const live::LiveSession& session, 
   own->add_actions();
   own->http.new_task_queue = [] { return new httplib::ThreadPool(kMostListeners + 8); };
   own->http.set_payload_max_length(options.largest_upload);
-  own->http.set_keep_alive_max_count(1000);
+  // One request a connection: what is left of a body that nobody read, as that of a refused request, must not be
+  // taken for a request of its own, which could then say of itself that it comes from here.
+  own->http.set_keep_alive_max_count(1);
   own->http.set_read_timeout(30);
   own->http.set_tcp_nodelay(true);
   // Not the library's SO_REUSEPORT, with which two servers share a port without a word.
@@ -256,12 +256,13 @@ Result<std::unique_ptr<Server>> Server::start(const live::LiveSession& session, 
                    : own->http.bind_to_port(options.host.c_str(), options.port) ? options.port
                                                                                 : -1;
   if (port < 0) {
-    return fail(ErrorCode::unwritable_output,
-                options.port == 0
-                    ? fmt::format("{}: is no address of this machine; choose another --host", options.host)
-                    : fmt::format("port {} of {} cannot be had ({}); another program, perhaps another asbuilt live, may "
-                                  "be using it: choose another --port, or 0 for any",
-                                  options.port, options.host, errno != 0 ? std::strerror(errno) : "taken"));
+    return fail(
+        ErrorCode::unwritable_output,
+        options.port == 0
+            ? fmt::format("{}: is no address of this machine; choose another --host", options.host)
+            : fmt::format("port {} of {} cannot be had ({}); another program, perhaps another asbuilt live, may "
+                          "be using it: choose another --port, or 0 for any",
+                          options.port, options.host, errno != 0 ? std::strerror(errno) : "taken"));
   }
   own->rules.port = port;
   Implementation& running = *own;

@@ -96,9 +96,9 @@ class Loop {
       if (watch.is_lost() == lost) continue;
       lost = watch.is_lost();
       inbox_.put([this, lost] {
-        session_.note(lost ? "bad" : "info", "",
-                      lost ? "the watched folder is gone; it is looked for until it is back"
-                           : "the watched folder is back");
+        session_.note(
+            lost ? "bad" : "info", "",
+            lost ? "the watched folder is gone; it is looked for until it is back" : "the watched folder is back");
       });
     }
   }

@@ -28,9 +28,11 @@ constexpr int kUnclosedFactor = 10;
 bool is_valid_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto byte = static_cast<unsigned char>(text[i]);
-    const std::size_t more = byte < 0x80 ? 0 : byte >= 0xc2 && byte < 0xe0 ? 1 : byte >= 0xe0 && byte < 0xf0 ? 2
-                             : byte >= 0xf0 && byte < 0xf5                 ? 3
-                                                                           : 4;
+    const std::size_t more = byte < 0x80                   ? 0
+                             : byte >= 0xc2 && byte < 0xe0 ? 1
+                             : byte >= 0xe0 && byte < 0xf0 ? 2
+                             : byte >= 0xf0 && byte < 0xf5 ? 3
+                                                           : 4;
     if (more == 4 || i + more >= text.size()) return false;
     for (std::size_t k = 1; k <= more; ++k) {
       if ((static_cast<unsigned char>(text[i + k]) & 0xc0) != 0x80) return false;
@@ -194,7 +196,8 @@ std::vector<FileEvent> FolderWatch::wait(std::chrono::milliseconds timeout) {
     take_settled(events);
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now());
     if (!events.empty() || left.count() <= 0) return events;
-    const auto step = candidates_.empty() && !lost_ ? left : std::min(left, std::max(settle_ / 3, std::chrono::milliseconds(5)));
+    const auto step =
+        candidates_.empty() && !lost_ ? left : std::min(left, std::max(settle_ / 3, std::chrono::milliseconds(5)));
     pollfd waiting{descriptor_, POLLIN, 0};
     ::poll(&waiting, 1, static_cast<int>(std::max<std::int64_t>(1, step.count())));
   }

@@ -56,7 +56,8 @@ class FolderWatch {
     bool closed = false;
   };
 
-  FolderWatch(std::filesystem::path folder, std::chrono::milliseconds settle) : folder_(std::move(folder)), settle_(settle) {}
+  FolderWatch(std::filesystem::path folder, std::chrono::milliseconds settle)
+      : folder_(std::move(folder)), settle_(settle) {}
   [[nodiscard]] bool start();
   void read_events();
   void list_folder();

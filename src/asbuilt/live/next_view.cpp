@@ -21,8 +21,7 @@ constexpr double kWantedOverlap = 0.25;  // pairs are linked from 0.10 on: some 
 constexpr double kWorthwhile = 0.002;    // of the skin
 
 double quantile(std::vector<double>& values, double share) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, place);
   return *place;
 }

@@ -26,7 +26,8 @@ struct SensorLimits {
 /// Before anything is known: as far from the part as it is long and a half, all of it in view.
 [[nodiscard]] SensorLimits assumed_limits(double diameter_mm);
 
-/// What one scan shows of its sensor, `points` in the scan frame, the sensor at `viewpoint`. `part` are those on the part.
+/// What one scan shows of its sensor, `points` in the scan frame, the sensor at `viewpoint`. `part` are those on the
+/// part.
 [[nodiscard]] SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const PointCloud& part_in_scan,
                                        const Eigen::Vector3d& viewpoint_in_scan);
 /// Of several scans: the widest cone and range, the median distance. Precondition: at least one.

@@ -158,8 +158,7 @@ Result<void> ScanStore::set_removed(const std::string& file, std::optional<std::
   }
   Json json{{"removed", Json::object()}};
   for (const auto& [name, hash] : changed) json["removed"][name] = hash;
-  ASBUILT_CHECK(io::write_file(folder_ / "live.json",
-                               json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"));
+  ASBUILT_CHECK(io::write_file(folder_ / "live.json", json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"));
   removed_ = std::move(changed);
   return {};
 }

@@ -18,9 +18,9 @@ namespace asbuilt::live {
 struct StoredFile {
   std::string file;  ///< name within the watched folder
   std::filesystem::path folder;
-  io::RunRecord record;               ///< what `asbuilt detect` writes for this file alone
+  io::RunRecord record;                ///< what `asbuilt detect` writes for this file alone
   std::optional<SensorLimits> limits;  ///< what it showed of its sensor
-  std::uint64_t order = 0;            ///< of arrival
+  std::uint64_t order = 0;             ///< of arrival
 };
 
 /// The session on disk: DIR/scans/FILE/ is a complete `detect` run of each file, made under another name and renamed

@@ -383,8 +383,7 @@ struct LiveSession::Implementation {
     return values;
   }
 
-  void describe_surface(LiveState& state, const SurfaceValues& values,
-                        const std::vector<const Entry*>& entries) const {
+  void describe_surface(LiveState& state, const SurfaceValues& values, const std::vector<const Entry*>& entries) const {
     state.covered_share = area_share(surface, [&](std::size_t v) { return values.support[v] > 0; });
     state.twice_share = area_share(surface, [&](std::size_t v) { return values.support[v] > 1; });
     std::vector<std::vector<char>> by_piece(state.pieces.size(), std::vector<char>(values.support.size(), 0));
@@ -485,8 +484,7 @@ Result<void> check_same_session(const ScanStore& store, const io::RunRecord& exp
     if (same_model && same_options) continue;
     return fail(ErrorCode::unwritable_output,
                 fmt::format("{}: holds a session with {}; choose another --output, or give --force to start anew",
-                            folder.string(),
-                            same_model ? "other options or of another version" : "another model"));
+                            folder.string(), same_model ? "other options or of another version" : "another model"));
   }
   return {};
 }
@@ -515,9 +513,9 @@ Result<std::unique_ptr<LiveSession>> LiveSession::open(const std::string& model_
   ASBUILT_CHECK(check_same_session(store, own->shared.empty_record, folder));
   own->store.emplace(std::move(store));
   own->surface = surface_of(own->model.prepared);
-  own->planner = std::make_unique<ViewPlanner>(own->surface, own->model.prepared,
-                                               options.sensor.value_or(assumed_limits(own->model.prepared.diameter)),
-                                               context);
+  own->planner =
+      std::make_unique<ViewPlanner>(own->surface, own->model.prepared,
+                                    options.sensor.value_or(assumed_limits(own->model.prepared.diameter)), context);
   LiveState& next = own->next;
   next.model = own->model.record;
   next.box = own->model.prepared.box;
@@ -653,8 +651,8 @@ Result<void> LiveSession::add(const std::string& path) {
   const pipeline::ScanHalf half = own.shared.half(own.model, own.options.pipeline);
   ASBUILT_TRY(folder, own.store->begin(file));
   const bool large = input.scans && std::ranges::any_of(*input.scans, [&](const io::ScanFile& scan) {
-    return scan.cloud.size() > own.options.first_look_above;
-  });
+                       return scan.cloud.size() > own.options.first_look_above;
+                     });
   bool told = false;
   if (large) {
     try {
@@ -825,7 +823,8 @@ Result<bool> LiveSession::refine_jointly(std::stop_token stop) {
       state.refinement = refinement;
     });
   };
-  auto registration = pipeline::register_poses(std::move(scans), own.model, own.options.pipeline, *own.run, record, quiet);
+  auto registration =
+      pipeline::register_poses(std::move(scans), own.model, own.options.pipeline, *own.run, record, quiet);
   if (!registration) {
     back_to("due");
     if (registration.error().code == ErrorCode::cancelled || quiet.cancelled()) return false;
@@ -890,8 +889,8 @@ Result<io::RunRecord> LiveSession::write_result(std::stop_token stop) {
     ASBUILT_TRY(record, pipeline::collect_runs(runs, nobody_named, folder));
     const pipeline::ScanHalf half = own.shared.half(own.model, own.options.pipeline);
     pipeline::look_for_mistaken_unit(record, half, folder, stoppable);
-    record.options = pipeline::merged(std::move(record.options),
-                                      pipeline::recorded(own.options.pipeline, {pipeline::Half::joint}));
+    record.options =
+        pipeline::merged(std::move(record.options), pipeline::recorded(own.options.pipeline, {pipeline::Half::joint}));
     ASBUILT_CHECK(pipeline::register_scans(own.model, own.options.pipeline, folder, record, stoppable));
     ASBUILT_CHECK(folder.finish(record));
     return std::move(record);

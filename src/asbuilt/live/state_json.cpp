@@ -79,9 +79,12 @@ Json json(const ScanState& scan, std::size_t index, const LiveState& state) {
 }
 
 Json json(const LinkState& link) {
-  return {{"a", link.a},       {"b", link.b},
-          {"overlap", number(link.overlap)}, {"used", link.used},
-          {"firmness", link.firmness},       {"rms", number(link.rms_mm)}};
+  return {{"a", link.a},
+          {"b", link.b},
+          {"overlap", number(link.overlap)},
+          {"used", link.used},
+          {"firmness", link.firmness},
+          {"rms", number(link.rms_mm)}};
 }
 
 Json json(const PieceState& piece) {
@@ -98,14 +101,10 @@ Json json(const PieceState& piece) {
 }
 
 Json json(const HoleState& hole) {
-  return {{"area", number(hole.hole.area_mm2)},
-          {"percent", percent(hole.hole.share)},
-          {"centre", vector(hole.hole.centre)},
-          {"normal", vector(hole.hole.normal)},
-          {"extent", number(hole.hole.extent_mm)},
-          {"face", hole.hole.face < 0 ? Json(nullptr) : Json(hole.hole.face)},
-          {"reachable", hole.reachable},
-          {"text", hole.text}};
+  return {{"area", number(hole.hole.area_mm2)},    {"percent", percent(hole.hole.share)},
+          {"centre", vector(hole.hole.centre)},    {"normal", vector(hole.hole.normal)},
+          {"extent", number(hole.hole.extent_mm)}, {"face", hole.hole.face < 0 ? Json(nullptr) : Json(hole.hole.face)},
+          {"reachable", hole.reachable},           {"text", hole.text}};
 }
 
 Json json(const ViewState& view) {
@@ -137,58 +136,58 @@ std::string to_json(const LiveState& state) {
   Json scans = Json::array(), notes = Json::array(), duplicates = Json::array();
   for (std::size_t i = 0; i < state.scans.size(); ++i) scans.push_back(json(state.scans[i], i, state));
   for (const Note& note : state.notes) {
-    notes.push_back({{"revision", note.revision}, {"level", note.level}, {"file", word(note.file)}, {"text", note.text}});
+    notes.push_back(
+        {{"revision", note.revision}, {"level", note.level}, {"file", word(note.file)}, {"text", note.text}});
   }
   for (const auto& [file, original] : state.duplicates) duplicates.push_back({{"file", file}, {"of", original}});
   const Json unreachable = state.coverable_share ? percent(1.0 - state.coverable_share.value()) : Json(nullptr);
   const bool has_sensor = state.sensor.distance_mm > 0.0;
-  return text_of(Json{
-      {"schema", 1},
-      {"revision", state.revision},
-      {"surface_revision", state.surface_revision},
-      {"phase", state.phase},
-      {"busy_with", word(state.busy_with)},
-      {"now", {{"level", state.now_level}, {"text", state.now_text}, {"sound", word(state.now_sound)}}},
-      {"model",
-       {{"path", state.model.path},
-        {"sha256", state.model.sha256},
-        {"unit", "mm"},
-        {"diameter", number(state.model.diameter)},
-        {"min", vector(Eigen::Vector3d(state.box.min()))},
-        {"max", vector(Eigen::Vector3d(state.box.max()))},
-        {"triangles", state.model.triangles},
-        {"symmetry", state.model.symmetry},
-        {"faces", state.faces}}},
-      {"watch", word(state.watch)},
-      {"output", state.output},
-      {"coverage",
-       {{"percent", percent(state.covered_share)},
-        {"twice_percent", percent(state.twice_share)},
-        {"coverable_percent", percent(state.coverable_share)},
-        {"scanned_area", number(state.covered_share * state.total_area_mm2)},
-        {"total_area", number(state.total_area_mm2)}}},
-      {"scans", scans},
-      {"links", list(state.links)},
-      {"pieces", list(state.pieces)},
-      {"holes", list(state.holes)},
-      {"views", list(state.views)},
-      {"sensor",
-       {{"half_angle", has_sensor ? number(state.sensor.half_angle_deg) : Json(nullptr)},
-        {"near", has_sensor ? number(state.sensor.near_mm) : Json(nullptr)},
-        {"far", has_sensor ? number(state.sensor.far_mm) : Json(nullptr)},
-        {"distance", has_sensor ? number(state.sensor.distance_mm) : Json(nullptr)},
-        {"source", state.sensor.source}}},
-      {"unreachable_percent", unreachable},
-      {"refinement",
-       {{"state", state.refinement},
-        {"scans", state.refined_scans},
-        {"rms", number(state.refinement_rms_mm)},
-        {"dropped", state.dropped_scans}}},
-      {"notes", notes},
-      {"removed", state.removed},
-      {"duplicates", duplicates},
-      {"result",
-       {{"state", state.result}, {"folder", word(state.result_folder)}, {"text", state.result_text}}}});
+  return text_of(
+      Json{{"schema", 1},
+           {"revision", state.revision},
+           {"surface_revision", state.surface_revision},
+           {"phase", state.phase},
+           {"busy_with", word(state.busy_with)},
+           {"now", {{"level", state.now_level}, {"text", state.now_text}, {"sound", word(state.now_sound)}}},
+           {"model",
+            {{"path", state.model.path},
+             {"sha256", state.model.sha256},
+             {"unit", "mm"},
+             {"diameter", number(state.model.diameter)},
+             {"min", vector(Eigen::Vector3d(state.box.min()))},
+             {"max", vector(Eigen::Vector3d(state.box.max()))},
+             {"triangles", state.model.triangles},
+             {"symmetry", state.model.symmetry},
+             {"faces", state.faces}}},
+           {"watch", word(state.watch)},
+           {"output", state.output},
+           {"coverage",
+            {{"percent", percent(state.covered_share)},
+             {"twice_percent", percent(state.twice_share)},
+             {"coverable_percent", percent(state.coverable_share)},
+             {"scanned_area", number(state.covered_share * state.total_area_mm2)},
+             {"total_area", number(state.total_area_mm2)}}},
+           {"scans", scans},
+           {"links", list(state.links)},
+           {"pieces", list(state.pieces)},
+           {"holes", list(state.holes)},
+           {"views", list(state.views)},
+           {"sensor",
+            {{"half_angle", has_sensor ? number(state.sensor.half_angle_deg) : Json(nullptr)},
+             {"near", has_sensor ? number(state.sensor.near_mm) : Json(nullptr)},
+             {"far", has_sensor ? number(state.sensor.far_mm) : Json(nullptr)},
+             {"distance", has_sensor ? number(state.sensor.distance_mm) : Json(nullptr)},
+             {"source", state.sensor.source}}},
+           {"unreachable_percent", unreachable},
+           {"refinement",
+            {{"state", state.refinement},
+             {"scans", state.refined_scans},
+             {"rms", number(state.refinement_rms_mm)},
+             {"dropped", state.dropped_scans}}},
+           {"notes", notes},
+           {"removed", state.removed},
+           {"duplicates", duplicates},
+           {"result", {{"state", state.result}, {"folder", word(state.result_folder)}, {"text", state.result_text}}}});
 }
 
 std::string to_json(const Surface& surface) {

@@ -42,8 +42,7 @@ std::vector<std::uint32_t> faces_of_vertices(const model::SurfaceMesh& mesh) {
   }
   std::vector<std::uint32_t> face(mesh.vertices.size(), 0);
   for (std::size_t v = 0; v < face.size(); ++v) {
-    const auto most =
-        std::ranges::max_element(area[v], {}, [](const auto& entry) { return entry.second; });
+    const auto most = std::ranges::max_element(area[v], {}, [](const auto& entry) { return entry.second; });
     if (most != area[v].end()) face[v] = most->first;
   }
   return face;
@@ -92,8 +91,8 @@ SeenDeviation seen_from(const PointCloud& part_in_scan, const Pose& model_from_s
   const KdTree tree(feet);
   const auto reach = static_cast<float>(std::max(1.5 * surface.edge_mm, 2.0 * spacing_mm));
   parallel_for(context, seen.size(), 512, [&](std::size_t v) {
-    const auto found = tree.nearest_facing(surface.mesh.vertices[v].cast<float>(), reach, normals,
-                                           surface.mesh.normals[v], kSameWay);
+    const auto found =
+        tree.nearest_facing(surface.mesh.vertices[v].cast<float>(), reach, normals, surface.mesh.normals[v], kSameWay);
     if (found.found()) seen[v] = deviation[found.index];
   });
   return seen;

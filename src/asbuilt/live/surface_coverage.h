@@ -16,12 +16,12 @@ namespace asbuilt::live {
 /// The skin as it is shown and counted: a mesh that carries values, and what follows from it alone.
 struct Surface {
   model::SurfaceMesh mesh;
-  std::vector<double> area_mm2;            ///< a third of the triangles around each vertex
-  std::vector<std::uint32_t> place;        ///< vertices at the same position have the same number, the lowest of them
+  std::vector<double> area_mm2;      ///< a third of the triangles around each vertex
+  std::vector<std::uint32_t> place;  ///< vertices at the same position have the same number, the lowest of them
   std::vector<std::vector<std::uint32_t>> neighbours;  ///< of each place, along edges
-  std::vector<std::uint32_t> face;         ///< CAD face with most of each vertex; empty if the model knows none
+  std::vector<std::uint32_t> face;  ///< CAD face with most of each vertex; empty if the model knows none
   double total_area_mm2 = 0.0;
-  double edge_mm = 0.0;                    ///< edges are not much longer, unless the number of triangles was capped
+  double edge_mm = 0.0;  ///< edges are not much longer, unless the number of triangles was capped
 };
 
 [[nodiscard]] Surface surface_of(const model::PreparedModel& model);

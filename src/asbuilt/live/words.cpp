@@ -120,16 +120,15 @@ void set_now(LiveState& state, int latest) {
     return say("bad", fmt::format("{} is not used: {}.{}", record.name, why_not_used(record), next()));
   }
   if (state.pieces.empty()) {
-    return say("act", state.views.empty()
-                          ? "Take the first scan."
-                          : "Take the first scan: " + state.views.front().text + ".");
+    return say("act",
+               state.views.empty() ? "Take the first scan." : "Take the first scan: " + state.views.front().text + ".");
   }
   if (state.pieces.size() > 1) {
     const PieceState& loose = state.pieces[1];
-    std::string text = fmt::format("In pieces: {} hang{} loose. ",
-                                   loose.scans.size() == 1 ? name_of(state, loose.scans.front())
-                                                           : fmt::format("{} scans", loose.scans.size()),
-                                   loose.scans.size() == 1 ? "s" : "");
+    std::string text = fmt::format(
+        "In pieces: {} hang{} loose. ",
+        loose.scans.size() == 1 ? name_of(state, loose.scans.front()) : fmt::format("{} scans", loose.scans.size()),
+        loose.scans.size() == 1 ? "s" : "");
     if (loose.join && loose.join->view >= 0) {
       text += "To join: " + state.views[static_cast<std::size_t>(loose.join->view)].text + ".";
     } else {
