@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "asbuilt/live/folder_watch.h"
 
@@ -27,9 +29,9 @@ class Inbox {
     {
       const std::lock_guard lock(mutex_);
       tasks_.push_back(std::move(task));
+      interrupt_.request_stop();
     }
     changed_.notify_all();
-    interrupt_.request_stop();
   }
   /// The next task, or nothing after the timeout.
   std::function<void()> take(std::chrono::milliseconds timeout) {
@@ -54,7 +56,7 @@ class Inbox {
 
  private:
   std::mutex mutex_;
-  std::condition_variable_any changed_;
+  std::condition_variable changed_;
   std::deque<std::function<void()>> tasks_;
   std::stop_source interrupt_;
 };
