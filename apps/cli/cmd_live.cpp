@@ -87,9 +87,10 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   }
   const std::string output =
       arguments.output.empty() ? (std::filesystem::path(arguments.watch) / "asbuilt-live").string() : arguments.output;
-  // Whoever is stopped while it judges a scan judges it again: only the loop is asked to end.
+  // Ctrl-C ends the session, not the scan that is being judged: it is part of the result.
   Context steady = context;
   steady.progress = nullptr;
+  steady.stop = {};
   ASBUILT_TRY(session, live::LiveSession::open(arguments.model, options, output, shell.common.force, steady));
   viewer::WatchOptions watch;
   watch.watch = arguments.watch;

@@ -199,9 +199,7 @@ struct Server::Implementation {
 
   void take_upload(const httplib::Request& request, httplib::Response& response,
                    const httplib::ContentReader& content) {
-    const auto refuse = [&](int status, const std::string& reason) {
-      answer(response, status, reason);
-    };
+    const auto refuse = [&](int status, const std::string& reason) { answer(response, status, reason); };
     if (request.get_param_value_count("name") != 1) return refuse(400, "give the file's name as ?name=...");
     const std::string file = request.get_param_value("name");
     if (const auto objection = objection_to_name(file)) return refuse(400, *objection);

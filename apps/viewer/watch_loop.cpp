@@ -119,6 +119,7 @@ class Loop {
         last_task = Clock::now();
       }
     }
+    while (auto task = inbox_.take(std::chrono::milliseconds(0))) task();  // what had come before the end
   }
 
   void keep_present() {

@@ -21,8 +21,9 @@ namespace {
 class Program {
  public:
   Program(const std::string& model, const fs::path& watched, const fs::path& output) {
-    std::vector<std::string> words{ASBUILT_PROGRAM, "live",   model, "--watch",   watched.string(), "-o",
-                                   output.string(), "--port", "0",   "--threads", "2",              "-q"};
+    std::vector<std::string> words{
+        ASBUILT_PROGRAM, "live", model, "--watch", watched.string(), "-o", output.string(), "--port", "0",
+        "--threads",     "2",    "-q"};
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -56,7 +57,8 @@ TEST_F(LiveScenes, KilledAtAnyMomentItGoesOnAndEndsWithTheSameBytes) {
   for (int i = 0; i < kills; ++i) {
     Program program(model(), watched(), output());
     // Scans come in while it runs; the last of them at the latest with the last kill.
-    while (given < names_.size() && given * static_cast<std::size_t>(kills) <= names_.size() * static_cast<std::size_t>(i)) {
+    while (given < names_.size() &&
+           given * static_cast<std::size_t>(kills) <= names_.size() * static_cast<std::size_t>(i)) {
       put(names_[given++]);
     }
     // From before the model is read to the joint refinement: the moment matters, not how long it takes.
@@ -65,8 +67,8 @@ TEST_F(LiveScenes, KilledAtAnyMomentItGoesOnAndEndsWithTheSameBytes) {
   }
   while (given < names_.size()) put(names_[given++]);
   const auto all_stored = [&] {
-    return std::ranges::all_of(names_,
-                               [&](const std::string& name) { return fs::exists(output() / "scans" / name / "live.json"); });
+    return std::ranges::all_of(
+        names_, [&](const std::string& name) { return fs::exists(output() / "scans" / name / "live.json"); });
   };
   Program program(model(), watched(), output());
   for (int i = 0; i < 6000 && !all_stored(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));

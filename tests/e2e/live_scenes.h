@@ -30,8 +30,13 @@ class LiveScenes : public testing::Test {
   ~LiveScenes() override { fs::remove_all(base_); }
 
   void simulate_scenes(int scans, std::uint64_t seed, double absent_share = 0.0) {
-    simulate::SimulateOptions options{.scans = scans, .points = 20000, .seed = seed, .clutter_objects = 3,
-                                      .clutter_high = 0.7, .absent_share = absent_share, .as_built = {}};
+    simulate::SimulateOptions options{.scans = scans,
+                                      .points = 20000,
+                                      .seed = seed,
+                                      .clutter_objects = 3,
+                                      .clutter_high = 0.7,
+                                      .absent_share = absent_share,
+                                      .as_built = {}};
     const auto simulation = simulate::simulate(casing(), options, Context(2));
     ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
     ASSERT_TRUE(simulate::write_simulation(base_ / "scenes", *simulation).has_value());

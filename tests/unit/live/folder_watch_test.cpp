@@ -93,10 +93,10 @@ TEST(ScanName, IsAPlainVisibleNameWithAScansExtension) {
   for (const char* good : {"scan.ply", "Scan 07.PLY", "größe.e57", "a.xyz.gz", "depth.png"}) {
     EXPECT_TRUE(is_scan_name(good)) << good;
   }
-  for (const std::string& bad : {std::string(""), std::string(".ply"), std::string(".a.ply"), std::string("a/b.ply"),
-                                 std::string("..\\a.ply"), std::string("a.ply\n"), std::string("a.step"),
-                                 std::string("a"), std::string("a.ply~"), std::string("a.ply.part"),
-                                 std::string("\xff.ply"), std::string(201, 'a') + ".ply"}) {
+  for (const std::string& bad :
+       {std::string(""), std::string(".ply"), std::string(".a.ply"), std::string("a/b.ply"), std::string("..\\a.ply"),
+        std::string("a.ply\n"), std::string("a.step"), std::string("a"), std::string("a.ply~"),
+        std::string("a.ply.part"), std::string("\xff.ply"), std::string(201, 'a') + ".ply"}) {
     EXPECT_FALSE(is_scan_name(bad)) << bad;
   }
 }

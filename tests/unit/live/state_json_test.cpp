@@ -23,9 +23,28 @@ TEST(StateJson, IsOneLineWithEveryFieldOfTheProtocol) {
   const std::string text = to_json(state);
   EXPECT_EQ(text.find('\n'), std::string::npos) << "server-sent events end a message at a break";
   const Json json = Json::parse(text);
-  for (const char* field : {"schema", "revision", "surface_revision", "phase", "busy_with", "now", "model", "watch",
-                            "output", "coverage", "scans", "links", "pieces", "holes", "views", "sensor",
-                            "unreachable_percent", "refinement", "notes", "removed", "duplicates", "result"}) {
+  for (const char* field : {"schema",
+                            "revision",
+                            "surface_revision",
+                            "phase",
+                            "busy_with",
+                            "now",
+                            "model",
+                            "watch",
+                            "output",
+                            "coverage",
+                            "scans",
+                            "links",
+                            "pieces",
+                            "holes",
+                            "views",
+                            "sensor",
+                            "unreachable_percent",
+                            "refinement",
+                            "notes",
+                            "removed",
+                            "duplicates",
+                            "result"}) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
   EXPECT_EQ(json["scans"][0]["model_from_scan"].size(), 16U);
