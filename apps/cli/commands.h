@@ -20,6 +20,7 @@ void add_explain_command(CLI::App& app, Shell& shell);
 void add_simulate_command(CLI::App& app, Shell& shell);
 void add_evaluate_command(CLI::App& app, Shell& shell);
 void add_export_command(CLI::App& app, Shell& shell);
+void add_live_command(CLI::App& app, Shell& shell);
 void add_info_command(CLI::App& app, Shell& shell);
 
 /// What a person wants to read of a run: one line a scan, then graph, refinement, deviation and where to look.

@@ -27,6 +27,7 @@ void add_commands(CLI::App& app, Shell& shell) {
   add_simulate_command(app, shell);
   add_evaluate_command(app, shell);
   add_export_command(app, shell);
+  add_live_command(app, shell);
   add_info_command(app, shell);
 }
 

@@ -13,12 +13,6 @@
 namespace asbuilt::pipeline {
 namespace {
 
-/// Graph and refinement that nothing contradicts any more.
-struct Registration {
-  graph::PoseGraph graph;
-  std::vector<RefinedComponent> components;
-};
-
 void drop(std::vector<PosedScan>& scans, const Contradiction& contradiction, io::RunRecord& record,
           const Context& context) {
   const auto position = scans.begin() + contradiction.member;
@@ -48,9 +42,9 @@ Result<graph::PoseGraph> linked(const std::vector<PosedScan>& scans, const Loade
 }
 
 /// Refines all components; names the first contradiction.
-Result<std::optional<Contradiction>> refine_all(Registration& registration, std::vector<PosedScan>& scans,
-                                                const LoadedModel& model, const Options& options, RunFolder& folder,
-                                                const Context& context) {
+Result<std::optional<Contradiction>> refine_all(Registration& registration, const LoadedModel& model,
+                                                const Options& options, RunFolder& folder, const Context& context) {
+  std::vector<PosedScan>& scans = registration.scans;
   const auto timed = folder.stage("refine");
   std::optional<Contradiction> contradiction;
   registration.components.clear();
@@ -68,14 +62,14 @@ Result<std::optional<Contradiction>> refine_all(Registration& registration, std:
 /// Links and refines; drops one contradicted scan at a time and begins again without it. Overlaps under detected poses
 /// are rough, and so are segments that were cut out under them: when all agree, points that other scans looked through
 /// go, the graph is made anew under the refined poses, and refinement goes on from there.
-Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
-                                RunFolder& folder, io::RunRecord& record, const Context& context) {
+Result<void> settle(Registration& registration, const LoadedModel& model, const Options& options, RunFolder& folder,
+                    io::RunRecord& record, const Context& context) {
   constexpr int kMostRounds = 3;
-  Registration registration;
+  std::vector<PosedScan>& scans = registration.scans;
   ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
   registration.graph = std::move(first_graph);
   for (int round = 1;; ++round) {
-    ASBUILT_TRY(contradiction, refine_all(registration, scans, model, options, folder, context));
+    ASBUILT_TRY(contradiction, refine_all(registration, model, options, folder, context));
     // Rough starts leave a graph with gaps, in which a scan may have gone astray that a better one brings back.
     if (contradiction && round > 1) {
       drop(scans, *contradiction, record, context);
@@ -85,7 +79,7 @@ Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel
       round = 0;
       continue;
     }
-    if (options.paper_mode || round == kMostRounds) return registration;
+    if (options.paper_mode || round == kMostRounds) return {};
     if (round == 1 && !contradiction) {
       for (const RefinedComponent& component : registration.components) {
         ASBUILT_CHECK(remove_seen_through(component, scans, context));
@@ -93,7 +87,7 @@ Result<Registration> registered(std::vector<PosedScan>& scans, const LoadedModel
     }
     for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local;
     ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
-    if (round > 1 && same_links(graph, registration.graph)) return registration;
+    if (round > 1 && same_links(graph, registration.graph)) return {};
     registration.graph = std::move(graph);
   }
 }
@@ -145,8 +139,8 @@ std::string missing_link(int scan, const std::vector<int>& largest, const graph:
   return "it overlaps with no scan of the largest component";
 }
 
-void describe_scans(io::RunRecord& record, const Registration& registration, const std::vector<PosedScan>& scans,
-                    const Context& context) {
+void describe_scans(io::RunRecord& record, const Registration& registration, const Context& context) {
+  const std::vector<PosedScan>& scans = registration.scans;
   for (std::size_t number = 0; number < registration.components.size(); ++number) {
     for (const int member : registration.components[number].members) {
       const PosedScan& posed = scans[static_cast<std::size_t>(member)];
@@ -231,6 +225,21 @@ Result<void> inspect_and_report(const fuse::Reconstruction& reconstruction, cons
 
 }  // namespace
 
+Result<Registration> register_poses(std::vector<PosedScan> scans, const LoadedModel& model, const Options& options,
+                                    RunFolder& folder, io::RunRecord& record, const Context& context) {
+  Registration registration;
+  registration.scans = std::move(scans);
+  ASBUILT_CHECK(settle(registration, model, options, folder, record, context));
+  record.graph = recorded_graph(registration.graph, registration.scans);
+  record.refinement.emplace();
+  for (std::size_t i = 0; i < registration.components.size(); ++i) {
+    record.refinement->push_back(
+        recorded_refinement(registration.components[i], static_cast<int>(i), options, registration.scans));
+  }
+  describe_scans(record, registration, context);
+  return registration;
+}
+
 Result<void> register_scans(const LoadedModel& model, const Options& options, const InspectionInputs& inputs,
                             RunFolder& folder, io::RunRecord& record, const Context& context) {
   ASBUILT_TRY(scans, load_posed_scans(record, folder));
@@ -240,18 +249,12 @@ Result<void> register_scans(const LoadedModel& model, const Options& options, co
     for (const std::string& stale : report::report_files()) folder.remove(stale);
     return {};
   }
-  ASBUILT_TRY(registration, registered(scans, model, options, folder, record, context));
-  record.graph = recorded_graph(registration.graph, scans);
-  record.refinement.emplace();
-  for (std::size_t i = 0; i < registration.components.size(); ++i) {
-    record.refinement->push_back(recorded_refinement(registration.components[i], static_cast<int>(i), options, scans));
-  }
-  describe_scans(record, registration, scans, context);
+  ASBUILT_TRY(registration, register_poses(std::move(scans), model, options, folder, record, context));
 
   fuse::Reconstruction reconstruction;
   {
     const auto timed = folder.stage("fuse");
-    ASBUILT_TRY(fused_scans, fused(registration.components.front(), scans, options, context));
+    ASBUILT_TRY(fused_scans, fused(registration.components.front(), registration.scans, options, context));
     reconstruction = std::move(fused_scans);
   }
   ASBUILT_TRY(mesh, surface_of(reconstruction, options, folder, context));

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <vector>
 
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/result.h"
@@ -11,6 +12,7 @@
 #include "asbuilt/pipeline/inspection_inputs.h"
 #include "asbuilt/pipeline/load_model.h"
 #include "asbuilt/pipeline/options.h"
+#include "asbuilt/pipeline/posed_scans.h"
 #include "asbuilt/pipeline/run_folder.h"
 
 namespace asbuilt::pipeline {
@@ -25,5 +27,19 @@ namespace asbuilt::pipeline {
 [[nodiscard]] Result<void> register_scans(const LoadedModel& model, const Options& options,
                                           const InspectionInputs& inputs, RunFolder& folder, io::RunRecord& record,
                                           const Context& context);
+
+/// Graph and poses that nothing contradicts any more.
+struct Registration {
+  std::vector<PosedScan> scans;  ///< those that were not dropped
+  graph::PoseGraph graph;        ///< nodes are indices into `scans`
+  std::vector<RefinedComponent> components;
+};
+
+/// What `register_scans` does before anything is fused: links and refines the scans (as load_posed_scans gives them),
+/// drops what the others contradict, and fills status, pose, graph and refinement of the record. Writes nothing.
+/// Errors: not_possible, cancelled. Precondition: at least one scan.
+[[nodiscard]] Result<Registration> register_poses(std::vector<PosedScan> scans, const LoadedModel& model,
+                                                  const Options& options, RunFolder& folder, io::RunRecord& record,
+                                                  const Context& context);
 
 }  // namespace asbuilt::pipeline

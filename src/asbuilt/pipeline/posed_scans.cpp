@@ -67,20 +67,26 @@ scan::Viewpoint local_viewpoint(const io::ScanRecord& scan) {
 
 }  // namespace
 
+Result<PosedScan> posed_scan(const io::ScanRecord& scan, int index, const std::filesystem::path& segment) {
+  ASBUILT_EXPECT(scan.model_from_scan.has_value(), "a scan with a pose");
+  ASBUILT_TRY(part, read_part(segment, scan.offset));
+  PosedScan posed;
+  posed.index = index;
+  posed.part = std::move(part);
+  posed.model_from_local_detected = *scan.model_from_scan * Eigen::Translation3d(scan.offset);
+  posed.model_from_local_start = posed.model_from_local_detected;
+  posed.noise_sigma_mm = scan.noise_sigma;
+  posed.spacing_mm = scan.spacing;
+  posed.viewpoint = local_viewpoint(scan);
+  return posed;
+}
+
 Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, const RunFolder& folder) {
   std::vector<PosedScan> scans;
   for (std::size_t i = 0; i < record.scans.size(); ++i) {
     const io::ScanRecord& scan = record.scans[i];
     if (scan.status != io::ScanStatus::accepted || !scan.model_from_scan) continue;
-    ASBUILT_TRY(part, read_part(folder.file(io::segment_file(i, scan.name)), scan.offset));
-    PosedScan posed;
-    posed.index = static_cast<int>(i);
-    posed.part = std::move(part);
-    posed.model_from_local_detected = *scan.model_from_scan * Eigen::Translation3d(scan.offset);
-    posed.model_from_local_start = posed.model_from_local_detected;
-    posed.noise_sigma_mm = scan.noise_sigma;
-    posed.spacing_mm = scan.spacing;
-    posed.viewpoint = local_viewpoint(scan);
+    ASBUILT_TRY(posed, posed_scan(scan, static_cast<int>(i), folder.file(io::segment_file(i, scan.name))));
     scans.push_back(std::move(posed));
   }
   return scans;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,6 +45,10 @@ struct Contradiction {
   int member = 0;  ///< index into the posed scans
   std::string reason;
 };
+
+/// An accepted scan with its part, read from its segment file. `index` is its place in the record.
+/// Errors: unreadable_input.
+[[nodiscard]] Result<PosedScan> posed_scan(const io::ScanRecord& scan, int index, const std::filesystem::path& segment);
 
 /// The parts of all accepted scans, read from the folder's segments.
 [[nodiscard]] Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, const RunFolder& folder);

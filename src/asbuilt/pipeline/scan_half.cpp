@@ -22,18 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kScansTriedWithOtherUnits = 2;
 
-/// What reading a scan found out before anything was computed.
-struct InputFile {
-  std::string path, sha256;
-  Result<std::vector<io::ScanFile>> scans;
-};
-
-InputFile read_input(const std::string& path, const Options& options) {
-  const auto content = io::FileContent::open(path);
-  if (!content) return {path, "", tl::unexpected(content.error())};
-  return {path, io::sha256(content->view()), io::scans_in(path, content->view(), scan_reading(options))};
-}
-
 io::ScanRecord failed_record(const std::string& path, std::string name, const Error& error) {
   io::ScanRecord record;
   record.path = path;
@@ -172,6 +160,11 @@ class ScanHalfRun {
       const auto timed = folder_.stage("read", fs::path(path).stem().string());
       return read_input(path, half_.options);
     }();
+    return take(input);
+  }
+
+  [[nodiscard]] Result<void> take(InputFile& input) {
+    const std::string& path = input.path;
     if (!input.scans) {
       context_.warn(input.scans.error().message);
       auto record = failed_record(path, fs::path(path).stem().string(), input.scans.error());
@@ -272,9 +265,45 @@ double spacing_of_found(const io::RunRecord& record) {
   return spacings[spacings.size() / 2];
 }
 
-/// When nothing was found anywhere, a mistaken unit is the likeliest cause: says so if it is. Where the part was found
-/// in other scans, only one whose points lie far closer or far wider than theirs is suspected.
-void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder, const Context& context) {
+}  // namespace
+
+InputFile read_input(const std::string& path, const Options& options) {
+  const auto content = io::FileContent::open(path);
+  if (!content) return {path, "", tl::unexpected(content.error())};
+  return {path, io::sha256(content->view()), io::scans_in(path, content->view(), scan_reading(options))};
+}
+
+ScanHalf SharedByScans::half(const LoadedModel& model, const Options& options) const {
+  return {model, *codebook, options, viewpoints, starts};
+}
+
+Result<SharedByScans> shared_by_scans(const LoadedModel& model, const Options& options, RunFolder& folder,
+                                      const Context& context) {
+  SharedByScans shared;
+  ASBUILT_TRY(viewpoints, Viewpoints::from_text(options.viewpoint, options.scan_unit));
+  shared.viewpoints = std::move(viewpoints);
+  if (!options.poses.empty()) {
+    ASBUILT_TRY(read, io::read_poses(options.poses, io::Unit::millimetre));
+    shared.starts = std::move(read);
+  }
+  shared.empty_record.version = kVersion;
+  shared.empty_record.options = recorded(options, {Half::model, Half::scan});
+  ASBUILT_CHECK(add_hashes(shared.empty_record.options, options));
+  shared.empty_record.model = model.record;
+  const auto timed = folder.stage("codebook");
+  ASBUILT_TRY(codebook, detect::build_codebook(model.prepared, options.detect, context));
+  shared.codebook = std::move(codebook);
+  return shared;
+}
+
+Result<void> take_scans(InputFile& input, const ScanHalf& half, RunFolder& folder, io::RunRecord& record,
+                        const Context& context) {
+  ScanHalfRun run(half, FinishedScans({}, record.options, folder), record, folder, context);
+  return run.take(input);
+}
+
+void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder,
+                            const Context& context) {
   constexpr double kFarOff = 5.0;
   const double usual_spacing = spacing_of_found(record);
   std::size_t tried = 0;
@@ -299,30 +328,14 @@ void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFold
   }
 }
 
-}  // namespace
-
 Result<io::RunRecord> detect_scans(const LoadedModel& model, std::span<const std::string> scan_paths,
                                    const Options& options, RunFolder& folder, const Context& context) {
   ASBUILT_CHECK(check_names(scan_paths, options));
-  ASBUILT_TRY(viewpoints, Viewpoints::from_text(options.viewpoint, options.scan_unit));
-  std::vector<io::NamedPose> starts;
-  if (!options.poses.empty()) {
-    ASBUILT_TRY(read, io::read_poses(options.poses, io::Unit::millimetre));
-    starts = std::move(read);
-  }
   ASBUILT_TRY(earlier, folder.earlier_run(model.record));
+  ASBUILT_TRY(shared, shared_by_scans(model, options, folder, context));
 
-  io::RunRecord record;
-  record.version = kVersion;
-  record.options = recorded(options, {Half::model, Half::scan});
-  ASBUILT_CHECK(add_hashes(record.options, options));
-  record.model = model.record;
-  ASBUILT_TRY(codebook, [&] {
-    const auto timed = folder.stage("codebook");
-    return detect::build_codebook(model.prepared, options.detect, context);
-  }());
-
-  const ScanHalf half{model, *codebook, options, viewpoints, starts};
+  io::RunRecord record = shared.empty_record;
+  const ScanHalf half = shared.half(model, options);
   ScanHalfRun run(half, FinishedScans(std::move(earlier), record.options, folder), record, folder, context);
   for (std::size_t i = 0; i < scan_paths.size(); ++i) {
     if (context.cancelled()) break;

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <set>
+
+#include "asbuilt/live/session.h"
+#include "live_scenes.h"
+
+namespace asbuilt::live {
+namespace {
+
+namespace fs = std::filesystem;
+
+class LiveSessionTest : public test::LiveScenes {
+ protected:
+  [[nodiscard]] std::unique_ptr<LiveSession> open(const LiveOptions& options = {}) const {
+    auto session = LiveSession::open(model(), options, output(), false, Context(2));
+    EXPECT_TRUE(session.has_value()) << session.error().message;
+    return session ? std::move(*session) : nullptr;
+  }
+};
+
+TEST_F(LiveSessionTest, EndsWithTheBytesOfReconstructInWhateverOrderScansCame) {
+  simulate_scenes(5, 21, 0.2);
+  auto session = open();
+  for (const int i : {3, 0, 4}) ASSERT_TRUE(session->add(put(names_[static_cast<std::size_t>(i)])).has_value());
+  ASSERT_TRUE(session->refine_jointly({}).has_value());
+  session.reset();  // and it goes on where it was
+  session = open();
+  EXPECT_EQ(session->state()->scans.size(), 3U);
+  for (const int i : {2, 1}) ASSERT_TRUE(session->add(put(names_[static_cast<std::size_t>(i)])).has_value());
+  const auto record = session->write_result({});
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  reconstruct(base_ / "reference");
+  EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
+}
+
+TEST_F(LiveSessionTest, ShowsAfterTheJointRefinementWhatTheResultWillHave) {
+  simulate_scenes(5, 22);
+  auto session = open();
+  for (const std::string& name : names_) ASSERT_TRUE(session->add(put(name)).has_value());
+  const auto before = session->state();
+  std::set<std::pair<std::string, std::string>> incremental;
+  ASSERT_TRUE(session->refine_jointly({}).value());
+  const auto state = session->state();
+  const auto record = session->write_result({});
+  ASSERT_TRUE(record.has_value());
+  ASSERT_EQ(state->scans.size(), record->scans.size());
+  for (std::size_t i = 0; i < record->scans.size(); ++i) {
+    const io::ScanRecord& shown = state->scans[i].record;
+    EXPECT_EQ(shown.status, record->scans[i].status) << shown.name;
+    if (!record->scans[i].model_from_scan) continue;
+    ASSERT_TRUE(shown.model_from_scan.has_value());
+    // A point at the part's edge moves by less than 0.05 sigma between the two.
+    const double sigma = std::max(shown.noise_sigma, 1e-3), reach = record->model.diameter;
+    const Pose apart = record->scans[i].model_from_scan->inverse() * *shown.model_from_scan;
+    EXPECT_LE(apart.translation().norm() + reach * rotation_angle(apart.linear()), 0.05 * sigma) << shown.name;
+  }
+  std::set<std::pair<int, int>> shown_links, final_links;
+  for (const LinkState& link : state->links) {
+    if (link.used) shown_links.insert({link.a, link.b});
+  }
+  for (const io::OverlapRecord& overlap : record->graph->overlaps) {
+    if (overlap.linked) final_links.insert({std::min(overlap.a, overlap.b), std::max(overlap.a, overlap.b)});
+  }
+  EXPECT_EQ(shown_links, final_links);
+  EXPECT_GT(state->covered_share, 0.2);
+  EXPECT_GE(state->covered_share, before->covered_share - 0.05);
+}
+
+TEST_F(LiveSessionTest, RemovalReplacementAndDuplicatesLeaveNoTrace) {
+  simulate_scenes(3, 23);
+  auto session = open();
+  for (const std::string& name : names_) ASSERT_TRUE(session->add(put(name)).has_value());
+  // A copy under a later name counts once; under an earlier name it takes over.
+  ASSERT_TRUE(session->add(put(names_[0], "zz.ply")).has_value());
+  EXPECT_THAT(session->state()->duplicates, testing::ElementsAre(testing::Pair("zz.ply", names_[0])));
+  EXPECT_EQ(session->state()->scans.size(), 3U);
+  // The original goes: the copy comes to life.
+  fs::remove(watched() / names_[0]);
+  ASSERT_TRUE(session->remove(names_[0]).has_value());
+  EXPECT_EQ(session->state()->scans.size(), 3U);
+  EXPECT_EQ(session->state()->scans.back().file, "zz.ply");
+  // Another content under a known name.
+  fs::remove(watched() / "zz.ply");
+  ASSERT_TRUE(session->remove("zz.ply").has_value());
+  ASSERT_TRUE(session->add(put(names_[0], names_[1])).has_value());
+  EXPECT_EQ(session->state()->scans.size(), 2U);
+  // Taken out and let in again, over a restart.
+  ASSERT_TRUE(session->take_out(names_[2]).value());
+  session.reset();
+  session = open();
+  ASSERT_TRUE(session->add((watched() / names_[2]).string()).has_value());
+  EXPECT_EQ(session->state()->scans.size(), 1U);
+  EXPECT_THAT(session->state()->removed, testing::ElementsAre(names_[2]));
+  ASSERT_TRUE(session->restore(names_[2]).value());
+  ASSERT_TRUE(session->add((watched() / names_[2]).string()).has_value());
+  ASSERT_TRUE(session->write_result({}).has_value());
+  reconstruct(base_ / "reference");
+  EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
+}
+
+TEST_F(LiveSessionTest, AFirstLookAtALargeScanIsFollowedByTheWholeAndChangesNothing) {
+  simulate_scenes(2, 24);
+  LiveOptions options;
+  options.first_look_above = 10000;
+  options.first_look_points = 12000;
+  auto session = open(options);
+  int provisional = 0;
+  session->on_change = [&](const std::shared_ptr<const LiveState>& state) {
+    provisional += std::ranges::any_of(state->scans, &ScanState::provisional) ? 1 : 0;
+  };
+  for (const std::string& name : names_) ASSERT_TRUE(session->add(put(name)).has_value());
+  EXPECT_GE(provisional, 2);
+  EXPECT_TRUE(std::ranges::none_of(session->state()->scans, &ScanState::provisional));
+  ASSERT_TRUE(session->write_result({}).has_value());
+  reconstruct(base_ / "reference");
+  EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
+}
+
+TEST_F(LiveSessionTest, WhatIsNoScanIsAnEntryThatFailedAndSaysWhy) {
+  simulate_scenes(1, 25);
+  auto session = open();
+  io::write_file(watched() / "half.ply", io::read_file(base_ / "scenes" / names_[0]).value().substr(0, 5000)).value();
+  ASSERT_TRUE(session->add((watched() / "half.ply").string()).has_value());
+  const auto state = session->state();
+  ASSERT_EQ(state->scans.size(), 1U);
+  EXPECT_EQ(state->scans[0].record.status, io::ScanStatus::failed);
+  EXPECT_THAT(state->scans[0].sentence, testing::HasSubstr("half.ply"));
+  EXPECT_EQ(state->now_level, "bad");
+  // Whole at last.
+  ASSERT_TRUE(session->add(put(names_[0], "half.ply")).has_value());
+  EXPECT_NE(session->state()->scans[0].record.status, io::ScanStatus::failed);
+}
+
+TEST_F(LiveSessionTest, AFullDiskIsToldAndTheSessionLives) {
+  simulate_scenes(1, 26);
+  auto session = open();
+  const std::string path = put(names_[0]);
+  ::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = 4096;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const auto refused = session->add(path);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::unwritable_output);
+  EXPECT_TRUE(session->state()->scans.empty());
+  ASSERT_TRUE(session->add(path).has_value());
+  EXPECT_EQ(session->state()->scans.size(), 1U);
+}
+
+TEST_F(LiveSessionTest, AFolderOfAnotherModelIsRefused) {
+  simulate_scenes(1, 27);
+  auto session = open();
+  ASSERT_TRUE(session->add(put(names_[0])).has_value());
+  session.reset();
+  const auto other = LiveSession::open((base_ / "scenes" / "as_built.ply").string(), {}, output(), false, Context(2));
+  ASSERT_FALSE(other.has_value());
+  EXPECT_EQ(other.error().code, ErrorCode::unwritable_output);
+  EXPECT_THAT(other.error().message, testing::HasSubstr("another model"));
+}
+
+}  // namespace
+}  // namespace asbuilt::live
