@@ -13,7 +13,7 @@ namespace asbuilt::pipeline {
 namespace {
 
 Result<PointCloud> points_of(const std::string& path, const Options& options, const Context& context) {
-  ASBUILT_TRY(files, io::read_scans(path, scan_reading(options)));
+  ASBUILT_TRY(files, io::read_scans(path, scan_reading(options, path)));
   PointCloud all;
   for (const io::ScanFile& file : files) {
     const PointCloud cloud = scan::sanitise(file.cloud, context).cloud;
