@@ -161,7 +161,7 @@ TEST_F(Units, EachScanMayHaveAUnitOfItsOwn) {
   options.scan_units = {"scan_01:inch", "scan_02.ply:cm", mixed[3] + ":foot", "scan_04:mm"};
   // A viewpoint is in the unit of its scan, too; the origin is the same in all of them.
   options.viewpoint = "0,0,0";
-  expect_same(detected(base_ / "model.ply", mixed, options, "mixed"), expected);
+  expect_same(detected(base_ / "model.ply", mixed, options, "mixed_result"), expected);
 
   options.scan_units = {"scan_17:inch"};
   const auto refused =

@@ -212,6 +212,13 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     ASBUILT_TRY(looked, look_closer(file, viewpoint, std::move(placements), half.model, half.options, context));
     closer = std::move(looked);
     placements = std::move(closer->placements);
+    if (closer->file.thinning) {
+      judged.record.warnings.push_back(
+          fmt::format("Even around the part there are more points than fit: one in each cube of {:.3g} mm was "
+                      "measured; raise --memory "
+                      "to measure all.",
+                      closer->file.thinning->spacing_mm));
+    }
     judged.record.noise_sigma = closer->scan.noise_sigma_mm;
     judged.record.spacing = closer->scan.spacing_mm;
     judged.record.normals_oriented = closer->scan.normals_oriented;

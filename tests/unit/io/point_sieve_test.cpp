@@ -44,6 +44,13 @@ std::filesystem::path written(const TemporaryFolder& folder, const std::vector<E
   return path;
 }
 
+PointSieve sieve_of(std::size_t capacity, std::function<bool(const Eigen::Vector3d&)> wants = {}) {
+  PointSieve sieve;
+  sieve.capacity = capacity;
+  sieve.wants = std::move(wants);
+  return sieve;
+}
+
 ReadOptions through(PointSieve sieve) {
   ReadOptions options;
   options.sieve = std::make_shared<const PointSieve>(std::move(sieve));
@@ -55,7 +62,7 @@ TEST(PointSieve, LeavesAScanThatFitsAsItIs) {
   auto points = uneven_square(1000, {0, 0, 10});
   points[17] = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   points[18] = Eigen::Vector3f::Zero();
-  const auto scan = read_scans(written(folder, points), through({.capacity = 1000})).value().front();
+  const auto scan = read_scans(written(folder, points), through(sieve_of(1000))).value().front();
   ASSERT_EQ(scan.cloud.size(), 1000u);
   EXPECT_FALSE(scan.thinning);
   EXPECT_TRUE(std::isnan(scan.cloud.positions[17].x()));
@@ -66,7 +73,7 @@ TEST(PointSieve, ThinsEvenlyAndWithinItsCapacity) {
   const TemporaryFolder folder;
   auto points = uneven_square(50000, {0, 0, 10});
   points[5] = Eigen::Vector3f::Zero();
-  const auto scan = read_scans(written(folder, points), through({.capacity = 2000})).value().front();
+  const auto scan = read_scans(written(folder, points), through(sieve_of(2000))).value().front();
   EXPECT_LE(scan.cloud.size(), 2000u);
   EXPECT_GE(scan.cloud.size(), 500u) << "far fewer than there is room for";
   ASSERT_TRUE(scan.thinning);
@@ -91,7 +98,7 @@ TEST(PointSieve, KeepsWhatIsWantedWholeWhereThatFits) {
   const TemporaryFolder folder;
   const auto points = uneven_square(50000, {0, 0, 10});
   const auto wanted = [](const Eigen::Vector3d& p) { return p.head<2>().norm() < 5.0; };
-  const auto scan = read_scans(written(folder, points), through({.capacity = 2000, .wants = wanted})).value().front();
+  const auto scan = read_scans(written(folder, points), through(sieve_of(2000, wanted))).value().front();
   const auto expected = std::ranges::count_if(points, [&](const auto& p) { return wanted(p.template cast<double>()); });
   ASSERT_GT(expected, 100);
   EXPECT_EQ(static_cast<std::ptrdiff_t>(scan.cloud.size()), expected);
@@ -119,8 +126,7 @@ TEST(PointSieve, WantsPlacesInTheScanFrameAlsoWhereAnOffsetIsTakenOff) {
                                      {"y", std::span<const double>(columns[1])},
                                      {"z", std::span<const double>(columns[2])}};
   ASSERT_TRUE(write_ply(folder.path() / "far.ply", named));
-  const auto read =
-      read_scans(folder.path() / "far.ply", through({.capacity = count, .wants = wanted})).value().front();
+  const auto read = read_scans(folder.path() / "far.ply", through(sieve_of(count, wanted))).value().front();
   EXPECT_GT(expected, 10u);
   EXPECT_EQ(read.cloud.size(), expected);
 }
@@ -130,10 +136,10 @@ TEST(PointSieve, SaysBeforehandHowManyPointsThereAreAndEndsWhenCancelled) {
   const auto path = written(folder, uneven_square(200000, {0, 0, 10}));
   std::uint64_t told = 0;
   double share = 0.0;
-  const PointSieve sieve{.capacity = 1000,
-                         .announced = [&](std::uint64_t points) { told = points; },
-                         .progress = [&](double done) { share = done; },
-                         .cancelled = [&] { return share > 0.5; }};
+  PointSieve sieve = sieve_of(1000);
+  sieve.announced = [&](std::uint64_t points) { told = points; };
+  sieve.progress = [&](double done) { share = done; };
+  sieve.cancelled = [&] { return share > 0.5; };
   const auto scan = read_scans(path, through(sieve)).value().front();
   EXPECT_EQ(told, 200000u);
   EXPECT_GT(share, 0.5);
