@@ -16,7 +16,7 @@
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/pose.h"
 #include "asbuilt/core/random.h"
-#include "asbuilt/io/ply_writer.h"
+#include "asbuilt/io/mesh_file.h"
 #include "asbuilt/model/ray_scene.h"
 #include "asbuilt/simulate/parts.h"
 
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   for (const Eigen::Vector3d& vertex : part.vertices) lowest = std::min(lowest, vertex.z());
   const Pose scene_from_model = placed(30, -20, -lowest, 0.7);
   const std::vector<TriangleMesh> scene{moved(part, scene_from_model),
-                                        moved(simulate::box({4000, 4000, 10}), placed(-2000, -2000, -10, 0)),
+                                        moved(simulate::box({12000, 12000, 10}), placed(-6000, -6000, -10, 0)),
                                         moved(simulate::box({150, 90, 200}), placed(260, 120, 0, 0.4)),
                                         moved(simulate::box({80, 220, 60}), placed(-330, 60, 0, -0.3)),
                                         moved(simulate::cylinder(60, 180), placed(60, 330, 0, 0))};
@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
       "z\nproperty float intensity\nend_header\n",
       side * side);
   std::vector<Point> row(side);
-  constexpr double kHalfView = 0.55;  // tangent
+  constexpr double kHalfView = 0.4;  // tangent; every ray meets the floor at least
   for (std::size_t r = 0; r < side; ++r) {
     parallel_for_blocks(context, side, 512, [&](std::size_t begin, std::size_t end) {
       Random random(1, "row", r * side + begin);
