@@ -39,6 +39,7 @@ void add_reconstruct_command(CLI::App& app, Shell& shell) {
       "  asbuilt reconstruct part.stl scans/*.ply -o result\n"
       "  asbuilt reconstruct part.stl scans/*.ply -o result --scan-unit m --tolerance -0.5,0.5 --json > result.json");
   run_on_call(*command, shell, [arguments, &shell] {
+    arguments->options.memory_gb = shell.common.memory_gb;
     return reported(pipeline::reconstruct(arguments->model, arguments->scans, arguments->options,
                                           output_of(arguments->output, shell), shell.context()),
                     *arguments, shell);
@@ -56,6 +57,7 @@ void add_detect_command(CLI::App& app, Shell& shell) {
       "  asbuilt detect part.stl scans/scan_00.ply -o detected_00\n"
       "  asbuilt detect part.stl scans/*.ply -o detected --viewpoint none --noise 0.1");
   run_on_call(*command, shell, [arguments, &shell] {
+    arguments->options.memory_gb = shell.common.memory_gb;
     return reported(pipeline::detect(arguments->model, arguments->scans, arguments->options,
                                      output_of(arguments->output, shell), shell.context()),
                     *arguments, shell);

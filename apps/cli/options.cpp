@@ -28,7 +28,25 @@ std::string group_of(Half half) {
 }
 
 void add_scan_options(CLI::App& command, pipeline::Options& options) {
-  add_unit_option(command, "--scan-unit", options.scan_unit, "Unit of the scans: mm, cm, m, inch or foot");
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--scan-unit",
+          [&options](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              if (text.find(':') != std::string::npos) {
+                const auto own = pipeline::parse_unit_of_scan(text);
+                if (!own) throw CLI::ValidationError("--scan-unit", own.error().message);
+                options.scan_units.push_back(text);
+                continue;
+              }
+              const auto unit = io::unit_from_name(text);
+              if (!unit) throw CLI::ValidationError("--scan-unit", unit.error().message);
+              options.scan_unit = *unit;
+            }
+          },
+          "Unit of the scans: mm, cm, m, inch or foot, or SCAN:UNIT for one of them; may be given several times (as "
+          "the file states, else mm)")
+      ->allow_extra_args(false);
   command.add_option(
       "--columns", options.columns,
       "Columns of text scans, out of x y z nx ny nz r g b i, with - for others: for example x,y,z,-,r,g,b");
@@ -157,7 +175,11 @@ void add_common_options(CLI::App& command, Shell& shell, bool has_output) {
   command.add_option("--threads", common.threads, "Threads to use (0: all cores)")
       ->check(CLI::Range(0, 1024))
       ->group(kGroup);
-  command.add_option("--memory", common.memory_gb, "Gigabytes to use at most; what needs more fails (0: no limit)")
+  command
+      .add_option(
+          "--memory", common.memory_gb,
+          "Gigabytes to use at most: scans that need more are thinned to find the part (0: half of the machine's for "
+          "a scan, no limit otherwise)")
       ->check(CLI::NonNegativeNumber)
       ->group(kGroup);
   command.add_flag("-q,--quiet", common.quiet, "No progress and no summary")->group(kGroup);

@@ -25,6 +25,18 @@ int exit_code_of(ErrorCode code) {
   return kNotDone;
 }
 
+namespace {
+
+/// What is left of a stage at the speed so far; nothing where it will soon be over, or where it is too early to tell.
+std::string time_left(double share, std::chrono::duration<double> taken) {
+  constexpr double kWorthTelling_s = 5.0;
+  if (share < 0.03 || share >= 1.0 || taken.count() < 1.0) return {};
+  const double left_s = taken.count() * (1.0 - share) / share;
+  return left_s < kWorthTelling_s ? std::string() : fmt::format(", about {:.0f} s left", left_s);
+}
+
+}  // namespace
+
 Shell::Shell(std::stop_token stop) : stop_(std::move(stop)), on_terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Context Shell::context() {
@@ -43,6 +55,7 @@ void Shell::show_stage(std::string_view stage, std::string_view scan) {
     const std::lock_guard lock(mutex_);
     stage_ = scan.empty() ? std::string(stage) : fmt::format("{} {}", scan, stage);
     shown_percent_ = -1;
+    stage_begin_ = std::chrono::steady_clock::now();
   }
   show_progress(0.0);
 }
@@ -53,7 +66,8 @@ void Shell::show_progress(double share) {
   if (percent == shown_percent_) return;
   shown_percent_ = percent;
   const int filled = percent / 5;
-  fmt::print(stderr, "\r\033[K[{:#<{}}{:->{}}] {}", "", filled, "", 20 - filled, stage_);
+  fmt::print(stderr, "\r\033[K[{:#<{}}{:->{}}] {}{}", "", filled, "", 20 - filled, stage_,
+             time_left(share, std::chrono::steady_clock::now() - stage_begin_));
   std::fflush(stderr);
   line_shown_ = true;
 }

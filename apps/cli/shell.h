@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <mutex>
 #include <stop_token>
@@ -71,6 +72,7 @@ class Shell {
   std::string stage_;
   int shown_percent_ = -1;
   bool line_shown_ = false;
+  std::chrono::steady_clock::time_point stage_begin_;
 };
 
 }  // namespace asbuilt::cli

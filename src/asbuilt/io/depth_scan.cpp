@@ -204,7 +204,7 @@ Result<std::vector<ScanFile>> read_depth_scan(const std::filesystem::path& path,
     const auto x = static_cast<double>(i % image.width), y = static_cast<double>(i / image.width);
     return Eigen::Vector3d((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth);
   };
-  ScanFile scan = assemble_scan(path, "png depth", points, options.unit);
+  ScanFile scan = assemble_scan(path, "png depth", points, options);
   scan.viewpoint_mm = Eigen::Vector3d::Zero();
   scan.grid = ScanGrid{image.height, image.width};
   scan.notes.push_back(fmt::format("A depth image of {} x {} pixels, camera fx {:g}, fy {:g}, cx {:g}, cy {:g}{}.",

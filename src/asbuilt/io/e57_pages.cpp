@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "asbuilt/io/crc32c.h"
+#include "asbuilt/io/file_map.h"
 
 namespace asbuilt::io {
 namespace {
@@ -95,6 +96,14 @@ Result<void> E57Pages::read(std::uint64_t logical, std::span<char> bytes) {
     const std::size_t count = std::min(bytes.size() - done, static_cast<std::size_t>(payload_ - within));
     std::memcpy(bytes.data() + done, input_.content.data() + page * page_size_ + within, count);
     done += count;
+  }
+  // Points are read from front to back; who goes back reads again from the file.
+  constexpr std::size_t kPiece = std::size_t{16} << 20;
+  const auto reached = static_cast<std::size_t>(physical_from_logical(logical));
+  if (reached < released_) released_ = reached;
+  if (reached - released_ >= 2 * kPiece) {
+    release_pages(input_.content.substr(released_, reached - released_ - kPiece));
+    released_ = reached - kPiece;
   }
   return {};
 }

@@ -42,6 +42,7 @@ class E57Pages {
   Input input_;
   std::uint64_t page_size_ = 0, payload_ = 0, xml_physical_ = 0, xml_length_ = 0;
   std::vector<bool> is_checked_;
+  std::size_t released_ = 0;  ///< bytes of the file before which pages may have left memory
 };
 
 }  // namespace asbuilt::io

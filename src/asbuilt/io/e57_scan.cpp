@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -143,10 +144,34 @@ struct IndexRange {
   }
 };
 
+/// Points spread evenly over a scan, which decide on its offset.
+class Probes {
+ public:
+  explicit Probes(std::size_t count) : count_(count) {}
+
+  /// In the order of the file, each point once.
+  void offer(std::uint64_t index, const Eigen::Vector3d& position) {
+    if (index != probe_index(next_, count_)) return;
+    positions_.push_back(position);
+    while (next_ < kOffsetProbes && probe_index(next_, count_) <= index) ++next_;
+  }
+  [[nodiscard]] Eigen::Vector3d offset_mm(double mm_per_unit) const {
+    RawPoints probed;
+    probed.count = positions_.size();
+    probed.position = [&](std::size_t i) { return positions_[i]; };
+    return precision_offset_mm(probed, mm_per_unit);
+  }
+
+ private:
+  std::size_t count_, next_ = 0;
+  std::vector<Eigen::Vector3d> positions_;
+};
+
 class ScanReader {
  public:
-  ScanReader(const Input& input, E57Pages& pages, const XmlElement& element, double mm_per_unit)
-      : input_(input), pages_(pages), element_(element), mm_per_unit_(mm_per_unit) {}
+  ScanReader(const Input& input, E57Pages& pages, const XmlElement& element, double mm_per_unit,
+             const PointSieve* sieve)
+      : input_(input), pages_(pages), element_(element), mm_per_unit_(mm_per_unit), sieve_(sieve) {}
 
   Result<ScanFile> read() {
     const XmlElement* points_element = element_.child("points");
@@ -168,12 +193,6 @@ class ScanReader {
  private:
   Result<void> read_points(const E57Points& points, const Columns& columns, ScanFile& scan) {
     const auto count = static_cast<std::size_t>(points.records);
-    std::vector<Eigen::Vector3d> probes;
-    ASBUILT_CHECK(read_attributes(points, columns, scan, probes));
-    const RawPoints probed{probes.size(), [&](std::size_t i) { return probes[i]; }, {}, {}, {}};
-    scan.offset_mm = precision_offset_mm(probed, mm_per_unit_);
-    if (scan.offset_mm.isZero(0.0)) return {};
-    // Large coordinates are rare; only they are read a second time.
     Columns reduced = columns;
     reduced.wanted.clear();
     for (auto& column : reduced.position) {
@@ -183,57 +202,67 @@ class ScanReader {
       reduced.invalid =
           reduced.add(static_cast<std::ptrdiff_t>(columns.wanted[static_cast<std::size_t>(columns.invalid)]));
     }
+    const auto positions = [&](const std::function<void(std::uint64_t, const Eigen::Vector3d&)>& take) {
+      return for_each_e57_batch(input_, pages_, points, reduced.wanted,
+                                [&](std::uint64_t first, std::size_t size, std::span<const double* const> batch) {
+                                  for (std::size_t i = 0; i < size; ++i)
+                                    take(first + i, position_in(batch, reduced, i));
+                                });
+    };
+    if (sieve_ != nullptr && sieve_->applies_to(points.records)) {
+      // The sieve needs to know the offset before the first point.
+      Probes probes(count);
+      ASBUILT_CHECK(positions([&](std::uint64_t i, const Eigen::Vector3d& position) { probes.offer(i, position); }));
+      scan.offset_mm = probes.offset_mm(mm_per_unit_);
+      return read_attributes(points, columns, scan, nullptr);
+    }
+    Probes probes(count);
+    ASBUILT_CHECK(read_attributes(points, columns, scan, &probes));
+    scan.offset_mm = probes.offset_mm(mm_per_unit_);
+    if (scan.offset_mm.isZero(0.0)) return {};
+    // Large coordinates are rare; only they are read a second time.
     MovedPositions moved(scan, mm_per_unit_);
     scan.cloud.positions.clear();
     scan.cloud.positions.reserve(count);
-    ASBUILT_CHECK(for_each_e57_batch(input_, pages_, points, reduced.wanted,
-                                     [&](std::uint64_t, std::size_t size, std::span<const double* const> batch) {
-                                       for (std::size_t i = 0; i < size; ++i) {
-                                         moved.add(position_in(batch, reduced, i));
-                                       }
-                                     }));
+    ASBUILT_CHECK(positions([&](std::uint64_t, const Eigen::Vector3d& position) { moved.add(position); }));
     moved.note();
     return {};
   }
 
-  Result<void> read_attributes(const E57Points& points, const Columns& columns, ScanFile& scan,
-                               std::vector<Eigen::Vector3d>& probes) {
+  /// `probes` is empty where the offset is known already.
+  Result<void> read_attributes(const E57Points& points, const Columns& columns, ScanFile& scan, Probes* probes) {
     const auto count = static_cast<std::size_t>(points.records);
+    const bool is_sifted = probes == nullptr;
     const bool has_colour = columns.colour[0] >= 0;
     ColourScale colour;
     if (has_colour) colour = colour_scale(element_, points, columns);
-    scan.cloud.positions.reserve(count);
-    if (columns.normal[0] >= 0) scan.cloud.normals.reserve(count);
-    if (has_colour) scan.colours.reserve(count);
-    if (columns.intensity >= 0) scan.intensities.reserve(count);
+    if (!is_sifted) {
+      scan.cloud.positions.reserve(count);
+      if (columns.normal[0] >= 0) scan.cloud.normals.reserve(count);
+      if (has_colour) scan.colours.reserve(count);
+      if (columns.intensity >= 0) scan.intensities.reserve(count);
+    }
+    MovedPositions moved(scan, mm_per_unit_);
+    SievedPoints kept(scan, sieve_, points.records);
     IndexRange rows, grid_columns;
-    std::size_t next_probe = 0;
     const auto take = [&](std::uint64_t first, std::size_t size, std::span<const double* const> batch) {
       const auto column = [&](std::ptrdiff_t index) { return batch[static_cast<std::size_t>(index)]; };
+      if (kept.cancelled()) return;
       for (std::size_t i = 0; i < size; ++i) {
         const Eigen::Vector3d position = position_in(batch, columns, i);
-        if (first + i == probe_index(next_probe, count)) {
-          probes.push_back(position);
-          while (next_probe < kOffsetProbes && probe_index(next_probe, count) <= first + i) ++next_probe;
+        if (probes != nullptr) probes->offer(first + i, position);
+        if (!kept.add(moved.moved(position))) continue;
+        if (columns.normal[0] >= 0) {
+          scan.cloud.normals.push_back(
+              Eigen::Vector3d(column(columns.normal[0])[i], column(columns.normal[1])[i], column(columns.normal[2])[i])
+                  .cast<float>());
         }
-        scan.cloud.positions.push_back((position * mm_per_unit_).cast<float>());
-      }
-      if (columns.normal[0] >= 0) {
-        const double *x = column(columns.normal[0]), *y = column(columns.normal[1]), *z = column(columns.normal[2]);
-        for (std::size_t i = 0; i < size; ++i) {
-          scan.cloud.normals.push_back(Eigen::Vector3d(x[i], y[i], z[i]).cast<float>());
-        }
-      }
-      if (has_colour) {
-        for (std::size_t i = 0; i < size; ++i) {
+        if (has_colour) {
           Rgb rgb;
           for (std::size_t c = 0; c < 3; ++c) rgb[c] = colour(c, column(columns.colour[c])[i]);
           scan.colours.push_back(rgb);
         }
-      }
-      if (columns.intensity >= 0) {
-        const double* intensity = column(columns.intensity);
-        for (std::size_t i = 0; i < size; ++i) scan.intensities.push_back(static_cast<float>(intensity[i]));
+        if (columns.intensity >= 0) scan.intensities.push_back(static_cast<float>(column(columns.intensity)[i]));
       }
       if (columns.row >= 0 && columns.column >= 0) {
         for (std::size_t i = 0; i < size; ++i) {
@@ -243,6 +272,8 @@ class ScanReader {
       }
     };
     ASBUILT_CHECK(for_each_e57_batch(input_, pages_, points, columns.wanted, take));
+    kept.finish();
+    if (is_sifted) moved.note();
     if (rows.count() > 0 && grid_columns.count() > 0) scan.grid = ScanGrid{rows.count(), grid_columns.count()};
     return {};
   }
@@ -283,6 +314,7 @@ class ScanReader {
   E57Pages& pages_;
   const XmlElement& element_;
   double mm_per_unit_;
+  const PointSieve* sieve_;
 };
 
 }  // namespace
@@ -302,7 +334,7 @@ Result<std::vector<ScanFile>> read_e57_scans(const std::filesystem::path& path, 
   for (std::size_t i = 0; i < data->children.size(); ++i) {
     Input part = input;
     if (data->children.size() > 1) part.name += fmt::format(", scan {}", i);
-    scans.push_back(ScanReader(part, pages, data->children[i], millimetres_per(unit)).read());
+    scans.push_back(ScanReader(part, pages, data->children[i], millimetres_per(unit), options.sieve.get()).read());
   }
   ASBUILT_TRY(whole, readable_of(path, std::move(scans)));
   for (ScanFile& scan : whole) {

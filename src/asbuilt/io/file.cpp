@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -122,37 +121,26 @@ Result<std::string> read_file(const fs::path& path) {
 Result<FileContent> FileContent::open(const fs::path& path) {
   constexpr std::uintmax_t kSmallestMapped = 64u << 20;
   FileContent content;
+  content.name_ = path.string();
   std::error_code ignored;
   const bool is_large = fs::is_regular_file(path, ignored) && fs::file_size(path, ignored) >= kSmallestMapped;
   const Descriptor descriptor(is_large ? ::open(path.c_str(), O_RDONLY | O_CLOEXEC) : -1);
   struct stat status {};
   if (descriptor.open() && ::fstat(descriptor.get(), &status) == 0 && status.st_size > 0) {
-    const auto size = static_cast<std::size_t>(status.st_size);
-    void* const map = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor.get(), 0);
-    if (map != MAP_FAILED) {
-      ::madvise(map, size, MADV_SEQUENTIAL);
-      content.map_ = map;
-      content.size_ = size;
-      return content;
-    }
+    content.map_ = FileMap::open(descriptor.get(), static_cast<std::size_t>(status.st_size));
+    if (content.map_) return content;
   }
   ASBUILT_TRY(copy, read_file(path));  // also says what is wrong with a file that cannot be opened
   content.copy_ = std::move(copy);
   return content;
 }
 
-FileContent::FileContent(FileContent&& other) noexcept
-    : copy_(std::move(other.copy_)), map_(std::exchange(other.map_, nullptr)), size_(std::exchange(other.size_, 0)) {}
-
-FileContent& FileContent::operator=(FileContent&& other) noexcept {
-  std::swap(copy_, other.copy_);
-  std::swap(map_, other.map_);
-  std::swap(size_, other.size_);
-  return *this;
-}
-
-FileContent::~FileContent() {
-  if (map_ != nullptr) ::munmap(map_, size_);
+Result<void> FileContent::whole() const {
+  if (!map_ || !map_->was_cut_short()) return {};
+  return fail(ErrorCode::unreadable_input,
+              fmt::format("{}: the file was cut short while it was read; is another program writing it? Read it again "
+                          "when it is complete",
+                          name_));
 }
 
 Result<void> write_file(const fs::path& path, std::string_view content) {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "asbuilt/core/result.h"
+#include "asbuilt/io/file_map.h"
 
 namespace asbuilt::io {
 
@@ -14,29 +15,23 @@ namespace asbuilt::io {
 [[nodiscard]] Result<std::string> read_file(const std::filesystem::path& path);
 
 /// The content of a file without a copy of it where that matters: files from 64 MB on are mapped, so that the pages
-/// that were read can leave memory again. Whoever cuts such a file short while it is read ends the program, as with any
-/// map.
+/// that were read can leave memory again. Where such a file is cut short while it is read, zeros take the place of what
+/// is gone; who has read it asks `whole` whether what came out is worth anything.
 class FileContent {
  public:
   /// Errors: unreadable_input, as read_file.
   [[nodiscard]] static Result<FileContent> open(const std::filesystem::path& path);
 
-  FileContent(FileContent&& other) noexcept;
-  FileContent& operator=(FileContent&& other) noexcept;
-  FileContent(const FileContent&) = delete;
-  FileContent& operator=(const FileContent&) = delete;
-  ~FileContent();
+  [[nodiscard]] std::string_view view() const { return map_ ? map_->view() : std::string_view(copy_); }
 
-  [[nodiscard]] std::string_view view() const {
-    return map_ == nullptr ? std::string_view(copy_) : std::string_view(static_cast<const char*>(map_), size_);
-  }
+  /// Errors: unreadable_input if the file was cut short since it was opened.
+  [[nodiscard]] Result<void> whole() const;
 
  private:
   FileContent() = default;
 
-  std::string copy_;
-  void* map_ = nullptr;
-  std::size_t size_ = 0;
+  std::string name_, copy_;
+  std::optional<FileMap> map_;
 };
 
 /// Writes a file whole or not at all: a temporary beside it, fsync, then rename. Errors: unwritable_output.

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <optional>
 
+#include "asbuilt/io/file_map.h"
 #include "asbuilt/io/readers.h"
 #include "asbuilt/io/scan_assembly.h"
 
@@ -111,7 +112,12 @@ std::optional<std::string> flaw_in_records(const Input& input, const Header& hea
 
 /// LAS colours have 16 bits, but many writers put 8-bit values there.
 bool has_wide_colours(std::string_view points, const Header& header, std::size_t colour) {
+  constexpr std::uint64_t kRowsBetweenReleases = 1 << 20;
   for (std::uint64_t i = 0; i < header.points; ++i) {
+    if (i > 0 && i % kRowsBetweenReleases == 0) {
+      const std::size_t piece = kRowsBetweenReleases * header.record_size;
+      release_pages(points.substr(static_cast<std::size_t>(i) * header.record_size - piece, piece));
+    }
     const std::size_t at = static_cast<std::size_t>(i) * header.record_size + colour;
     for (std::size_t c = 0; c < 3; ++c) {
       if (little_at<std::uint16_t>(points, at + 2 * c) > 255) return true;
@@ -133,6 +139,7 @@ Result<std::vector<ScanFile>> read_las_scan(const std::filesystem::path& path, c
   }
   RawPoints raw;
   raw.count = static_cast<std::size_t>(header.points);
+  raw.rows = points.substr(0, raw.count * header.record_size);
   raw.position = [&](std::size_t i) {
     const std::size_t at = i * header.record_size;
     const Eigen::Vector3d whole(little_at<std::int32_t>(points, at), little_at<std::int32_t>(points, at + 4),
@@ -154,7 +161,7 @@ Result<std::vector<ScanFile>> read_las_scan(const std::filesystem::path& path, c
       return rgb;
     };
   }
-  ScanFile scan = assemble_scan(path, fmt::format("las 1.{}", header.minor), raw, options.unit);
+  ScanFile scan = assemble_scan(path, fmt::format("las 1.{}", header.minor), raw, options);
   if (options.unit == Unit::stated) {
     scan.notes.emplace_back(
         "LAS leaves the unit to the map it belongs to, so mm was taken; most LAS files are in metres, which "

@@ -64,7 +64,11 @@ Result<TriangleMesh> mesh_from(const std::filesystem::path& path, const Input& i
 Result<ModelFile> read_model(const std::filesystem::path& path, const ModelReadOptions& options) {
   ASBUILT_TRY(content, FileContent::open(path));
   const Input input{path.string(), content.view()};
-  if (!is_gzip(input.content)) return model_from(path, input, options);
+  if (!is_gzip(input.content)) {
+    auto model = model_from(path, input, options);
+    ASBUILT_CHECK(content.whole());
+    return model;
+  }
   ASBUILT_TRY(unpacked, gunzip(input));
   return model_from(name_without_gz(path), {path.string(), unpacked}, options);
 }

@@ -209,6 +209,9 @@ Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, c
 
   RawPoints points;
   points.count = static_cast<std::size_t>(header.points);
+  if (header.encoding == PcdEncoding::binary) {
+    points.rows = input.content.substr(header.body_begin, points.count * header.point_size);
+  }
   points.position = vectors_of(header, body, {"x", "y", "z"});
   points.normal = vectors_of(header, body, {"normal_x", "normal_y", "normal_z"});
   if (!points.normal) points.normal = vectors_of(header, body, {"nx", "ny", "nz"});
@@ -216,7 +219,7 @@ Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, c
   if (const auto field = header.find("intensity")) {
     points.intensity = [column = body.columns[*field]](std::size_t i) { return column[i]; };
   }
-  ScanFile scan = assemble_scan(path, fmt::format("pcd {}", name_of(header.encoding)), points, options.unit);
+  ScanFile scan = assemble_scan(path, fmt::format("pcd {}", name_of(header.encoding)), points, options);
   if (header.height > 1) scan.grid = ScanGrid{header.height, header.width};
   std::ranges::move(body.notes, std::back_inserter(scan.notes));
   if (const auto viewpoint = viewpoint_of(header)) {

@@ -207,6 +207,7 @@ PlyTable PlyBody::view_of(const PlyElement& element) const {
   table.rows = static_cast<std::size_t>(element.rows);
   const std::size_t stride = smallest_row(element, encoding_);
   const char* first = input_.content.data() + position_;
+  table.lies_in_file = input_.content.substr(position_, table.rows * stride);
   for (const PlyProperty& property : element.properties) {
     table.columns.push_back({first, stride, loader(property.type, encoding_)});
     first += size_of(property.type);

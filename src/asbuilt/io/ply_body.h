@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "asbuilt/core/result.h"
@@ -19,6 +20,7 @@ struct PlyTable {
   std::size_t rows = 0;
   std::vector<StridedColumn> columns;  ///< one per property; a list has load == nullptr
   std::vector<double> decoded;
+  std::string_view lies_in_file;  ///< the rows, where they were not parsed
 };
 
 /// The entries of one list property, row after row.

@@ -93,6 +93,7 @@ Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, c
 
   RawPoints points;
   points.count = table.rows;
+  points.rows = table.lies_in_file;
   points.position = row_of(*positions);
   if (const auto normals = normal_columns(element, table)) points.normal = row_of(*normals);
   points.colour = colours_in(element, table);
@@ -101,7 +102,7 @@ Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, c
     if (!index || element.properties[*index].is_list()) continue;
     points.intensity = [column = table.columns[*index]](std::size_t row) { return column[row]; };
   }
-  ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, options.unit);
+  ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, options);
   std::ranges::move(notes_on_the_rest(body, header, *vertex + 1), std::back_inserter(scan.notes));
   return std::vector<ScanFile>{std::move(scan)};
 }

@@ -32,8 +32,8 @@ struct Points {
 
 class PtxReader {
  public:
-  PtxReader(const std::filesystem::path& path, const Input& input, Unit unit)
-      : path_(path), input_(input), unit_(unit), lines_(input.content) {}
+  PtxReader(const std::filesystem::path& path, const Input& input, const ReadOptions& options)
+      : path_(path), input_(input), options_(options), lines_(input.content) {}
 
   std::vector<Result<ScanFile>> read() {
     std::vector<Result<ScanFile>> scans;
@@ -61,10 +61,10 @@ class PtxReader {
       raw.intensity = [&](std::size_t i) { return static_cast<double>(points.intensities[i]); };
     }
     if (!points.colours.empty()) raw.colour = [&](std::size_t i) { return points.colours[i]; };
-    ScanFile scan = assemble_scan(path_, "ptx", raw, unit_);
+    ScanFile scan = assemble_scan(path_, "ptx", raw, options_);
     scan.grid = ScanGrid{header.rows, header.columns};
     place(header, scan);
-    if (unit_ == Unit::stated) {
+    if (options_.unit == Unit::stated) {
       scan.notes.emplace_back(
           "PTX states no unit, so mm was taken; most programs write PTX in metres, which --scan-unit m says.");
     }
@@ -178,7 +178,7 @@ class PtxReader {
   /// The sensor's place in the scan's own frame, whichever way the writer meant it: with the points in the sensor's
   /// frame this is the origin, with the points already registered (and an identity for the matrix) the place itself.
   void place(const Header& header, ScanFile& scan) const {
-    const double mm_per_unit = millimetres_per(unit_);
+    const double mm_per_unit = millimetres_per(options_.unit);
     if (!is_rigid(header.file_from_scan, 1e-3)) {
       scan.notes.emplace_back("The matrix of the scan is not a rigid motion and was ignored.");
       return;
@@ -197,7 +197,7 @@ class PtxReader {
 
   const std::filesystem::path& path_;
   const Input& input_;
-  Unit unit_;
+  const ReadOptions& options_;
   LineCursor lines_;
 };
 
@@ -220,7 +220,7 @@ bool is_ptx(std::string_view content) {
 
 Result<std::vector<ScanFile>> read_ptx_scans(const std::filesystem::path& path, const Input& input,
                                              const ReadOptions& options) {
-  PtxReader reader(path, input, options.unit);
+  PtxReader reader(path, input, options);
   std::vector<Result<ScanFile>> read = reader.read();
   if (read.empty()) return input.error("the file holds nothing, expected PTX scans");
   ASBUILT_TRY(scans, readable_of(path, std::move(read)));

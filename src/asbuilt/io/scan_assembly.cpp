@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "asbuilt/io/file_map.h"
+
 namespace asbuilt::io {
 
 Eigen::Vector3d precision_offset_mm(const RawPoints& points, double mm_per_unit) {
@@ -32,13 +34,12 @@ Eigen::Vector3d precision_offset_mm(const RawPoints& points, double mm_per_unit)
 MovedPositions::MovedPositions(ScanFile& scan, double mm_per_unit)
     : scan_(scan), mm_per_unit_(mm_per_unit), moved_(!scan.offset_mm.isZero(0.0)) {}
 
-void MovedPositions::add(const Eigen::Vector3d& position) {
+Eigen::Vector3f MovedPositions::moved(const Eigen::Vector3d& position) {
   if (moved_ && position.isZero(0.0)) {
-    scan_.cloud.positions.push_back(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
     ++no_returns_;
-    return;
+    return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   }
-  scan_.cloud.positions.push_back((position * mm_per_unit_ - scan_.offset_mm).cast<float>());
+  return (position * mm_per_unit_ - scan_.offset_mm).cast<float>();
 }
 
 void MovedPositions::note() {
@@ -51,32 +52,36 @@ void MovedPositions::note() {
   }
 }
 
-ScanFile assemble_scan(const std::filesystem::path& path, std::string format, const RawPoints& points, Unit unit) {
+ScanFile assemble_scan(const std::filesystem::path& path, std::string format, const RawPoints& points,
+                       const ReadOptions& options) {
   ScanFile scan;
   scan.path = path;
   scan.name = path.stem().string();
   scan.format = std::move(format);
-  scan.unit = unit == Unit::stated ? Unit::millimetre : unit;
-  const double mm_per_unit = millimetres_per(unit);
+  scan.unit = options.unit == Unit::stated ? Unit::millimetre : options.unit;
+  const double mm_per_unit = millimetres_per(options.unit);
   scan.offset_mm = precision_offset_mm(points, mm_per_unit);
   MovedPositions positions(scan, mm_per_unit);
-  scan.cloud.positions.reserve(points.count);
-  for (std::size_t i = 0; i < points.count; ++i) positions.add(points.position(i));
-  positions.note();
-  if (points.normal) {
-    scan.cloud.normals.reserve(points.count);
-    for (std::size_t i = 0; i < points.count; ++i) scan.cloud.normals.push_back(points.normal(i).cast<float>());
+  SievedPoints kept(scan, options.sieve.get(), points.count);
+  if (options.sieve == nullptr || !options.sieve->applies_to(points.count)) {
+    scan.cloud.positions.reserve(points.count);
+    if (points.normal) scan.cloud.normals.reserve(points.count);
+    if (points.colour) scan.colours.reserve(points.count);
+    if (points.intensity) scan.intensities.reserve(points.count);
   }
-  if (points.colour) {
-    scan.colours.reserve(points.count);
-    for (std::size_t i = 0; i < points.count; ++i) scan.colours.push_back(points.colour(i));
-  }
-  if (points.intensity) {
-    scan.intensities.reserve(points.count);
-    for (std::size_t i = 0; i < points.count; ++i) {
-      scan.intensities.push_back(static_cast<float>(points.intensity(i)));
+  constexpr std::size_t kRowsBetweenReleases = 1 << 20;
+  const std::size_t row_size = points.count == 0 ? 0 : points.rows.size() / points.count;
+  for (std::size_t i = 0; i < points.count && !kept.cancelled(); ++i) {
+    if (i > 0 && i % kRowsBetweenReleases == 0) {
+      release_pages(points.rows.substr((i - kRowsBetweenReleases) * row_size, kRowsBetweenReleases * row_size));
     }
+    if (!kept.add(positions.moved(points.position(i)))) continue;
+    if (points.normal) scan.cloud.normals.push_back(points.normal(i).cast<float>());
+    if (points.colour) scan.colours.push_back(points.colour(i));
+    if (points.intensity) scan.intensities.push_back(static_cast<float>(points.intensity(i)));
   }
+  kept.finish();
+  positions.note();
   return scan;
 }
 

@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "asbuilt/io/point_sieve.h"
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/io/unit.h"
 
@@ -20,6 +23,8 @@ struct RawPoints {
   std::function<Eigen::Vector3d(std::size_t)> normal;  ///< these three are empty when the file has none
   std::function<Rgb(std::size_t)> colour;
   std::function<double(std::size_t)> intensity;
+  /// Rows of equal size, if that is what the file holds: those that were read may leave memory.
+  std::string_view rows;
 };
 
 /// How many points decide on the offset, and which: evenly spread over the index range, the same for the same file.
@@ -39,7 +44,11 @@ class MovedPositions {
  public:
   MovedPositions(ScanFile& scan, double mm_per_unit);
 
-  void add(const Eigen::Vector3d& position_in_file_unit);
+  /// In mm, offset taken off; NaN for what means "no return".
+  [[nodiscard]] Eigen::Vector3f moved(const Eigen::Vector3d& position_in_file_unit);
+  void add(const Eigen::Vector3d& position_in_file_unit) {
+    scan_.cloud.positions.push_back(moved(position_in_file_unit));
+  }
   void note();  ///< adds what should be known to the scan's notes
 
  private:
@@ -49,9 +58,10 @@ class MovedPositions {
   std::size_t no_returns_ = 0;
 };
 
-/// A scan in millimetres, offset taken off, with what the file has of normals, colours and intensities.
+/// A scan in millimetres, offset taken off, with what the file has of normals, colours and intensities, as far as the
+/// sieve of the options lets it pass.
 [[nodiscard]] ScanFile assemble_scan(const std::filesystem::path& path, std::string format, const RawPoints& points,
-                                     Unit unit);
+                                     const ReadOptions& options);
 
 /// The scans of a file that could be read, with their places in it and their names (NAME, or NAME_00, NAME_01, ... when
 /// the file holds several). What kept another from being read becomes a note; if none could be, the first error it is.

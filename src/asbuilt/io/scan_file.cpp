@@ -16,13 +16,13 @@ namespace {
 
 /// The vertices of a mesh, as structured-light software exports its scans.
 Result<std::vector<ScanFile>> scan_from_mesh(const std::filesystem::path& path, std::string format, const Input& input,
-                                             const Result<TriangleMesh>& read, Unit unit) {
+                                             const Result<TriangleMesh>& read, const ReadOptions& options) {
   if (!read) return tl::unexpected(read.error());
   if (read->vertices.empty()) return input.error("the file holds no points");
   RawPoints points;
   points.count = read->vertices.size();
   points.position = [&](std::size_t i) { return read->vertices[i]; };
-  ScanFile scan = assemble_scan(path, std::move(format), points, unit);
+  ScanFile scan = assemble_scan(path, std::move(format), points, options);
   scan.notes.emplace_back("The file is a mesh: its vertices were taken as points.");
   const bool is_text = scan.format != "stl binary";
   if (is_text && !input.content.ends_with('\n')) {
@@ -50,11 +50,11 @@ Result<std::vector<ScanFile>> read_kind(FileKind kind, const std::filesystem::pa
       return read_depth_scan(path, input, options);
     case FileKind::stl:
       return scan_from_mesh(path, is_ascii_stl(input.content) ? "stl ascii" : "stl binary", input, read_stl_mesh(input),
-                            options.unit);
+                            options);
     case FileKind::off:
-      return scan_from_mesh(path, "off", input, read_off_mesh(input), options.unit);
+      return scan_from_mesh(path, "off", input, read_off_mesh(input), options);
     case FileKind::obj:
-      return scan_from_mesh(path, "obj", input, read_obj_mesh(input), options.unit);
+      return scan_from_mesh(path, "obj", input, read_obj_mesh(input), options);
     case FileKind::step:
     case FileKind::iges:
     case FileKind::brep:
@@ -88,7 +88,9 @@ Result<std::vector<ScanFile>> scans_in(const std::filesystem::path& path, std::s
 
 Result<std::vector<ScanFile>> read_scans(const std::filesystem::path& path, const ReadOptions& options) {
   ASBUILT_TRY(content, FileContent::open(path));
-  return scans_in(path, content.view(), options);
+  auto scans = scans_in(path, content.view(), options);
+  ASBUILT_CHECK(content.whole());  // whatever a reader made of the zeros
+  return scans;
 }
 
 }  // namespace asbuilt::io

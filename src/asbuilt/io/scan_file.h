@@ -25,6 +25,12 @@ struct ScanGrid {
   std::uint64_t rows = 0, columns = 0;
 };
 
+/// What became of a scan that was too large to be kept whole.
+struct Thinning {
+  std::uint64_t points_in_file = 0;  ///< that are some: finite and not at (0, 0, 0)
+  double spacing_mm = 0.0;           ///< edge of the cubes of which each kept one point
+};
+
 /// One scan as its file gives it, in millimetres. Nothing is judged or removed here (that is scan/'s business):
 /// positions may be NaN, normals of any length.
 struct ScanFile {
@@ -39,6 +45,7 @@ struct ScanFile {
   std::optional<Pose> file_from_scan;                   ///< where the file places the scan, mm; none if it says nothing
   std::vector<Rgb> colours;                             ///< empty or one per point
   std::vector<float> intensities;                       ///< empty or one per point, on the file's own scale
+  std::optional<Thinning> thinning;                     ///< set where a sieve left some of the points out
   std::optional<ScanGrid> grid;                         ///< of a scan that knows its rows and columns
   Unit unit = Unit::millimetre;                         ///< in which the file was taken to be
   std::vector<std::string> notes;                       ///< what was guessed or skipped, a sentence each

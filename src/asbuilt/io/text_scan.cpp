@@ -134,7 +134,7 @@ Result<std::vector<ScanFile>> read_text_scan(const std::filesystem::path& path, 
     if (layout.normal) points.normal = [&](std::size_t i) { return block.normals[i]; };
     if (layout.colour) points.colour = [&](std::size_t i) { return block.colours[i]; };
     if (layout.intensity) points.intensity = [&](std::size_t i) { return static_cast<double>(block.intensities[i]); };
-    ScanFile scan = assemble_scan(path, format_of(path), points, options.unit);
+    ScanFile scan = assemble_scan(path, format_of(path), points, options);
     scan.notes.insert(scan.notes.begin(), layout.notes.begin(), layout.notes.end());
     scan.index_in_file = static_cast<int>(scans.size());
     if (blocks.size() > 1) scan.name += fmt::format("_{:02}", scans.size());

@@ -67,13 +67,6 @@ io::ScanFile thinned(const io::ScanFile& file, std::size_t wanted) {
   return thin;
 }
 
-/// Read, not mapped: a file that is cut short while it is read must not end the session.
-pipeline::InputFile read_whole(const std::string& path, const pipeline::Options& options) {
-  auto content = io::read_file(path);
-  if (!content) return {path, "", tl::unexpected(content.error())};
-  return {path, io::sha256(*content), io::scans_in(path, *content, pipeline::scan_reading(options))};
-}
-
 std::optional<Eigen::Vector3d> local_viewpoint(const io::ScanRecord& scan) {
   if (!scan.viewpoint || scan.viewpoint_kind != "point") return std::nullopt;
   return Eigen::Vector3d(*scan.viewpoint - scan.offset);
@@ -614,7 +607,8 @@ Result<void> LiveSession::add(const std::string& path) {
   const auto begin = Clock::now();
   const std::string file = fs::path(path).filename().string();
   const auto since = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
-  pipeline::InputFile input = read_whole(path, own.options.pipeline);
+  pipeline::InputFile input = pipeline::read_input(path, own.options.pipeline, own.context);
+  if (!input.scans && input.scans.error().code == ErrorCode::cancelled) return tl::unexpected(input.scans.error());
 
   const auto out = own.store->removed().find(file);
   if (out != own.store->removed().end()) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "asbuilt/pipeline/closer_look.h"
 #include "asbuilt/pipeline/find_part.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/verify/instances.h"
@@ -21,18 +22,18 @@ Pose for_local(const Pose& model_from_scan, const Eigen::Vector3d& offset_mm) {
   return model_from_scan * Eigen::Translation3d(offset_mm);
 }
 
-/// What the user typed, in the unit of the file, becomes a place in the scan's local coordinates.
-scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::ScanFile& file, const Options& options) {
-  const bool is_point = request.stated.kind == scan::Viewpoint::Kind::point;
-  if (is_point && options.scan_unit == io::Unit::stated) request.stated.value *= io::millimetres_per(file.unit);
-  if (request.stated.kind == scan::Viewpoint::Kind::point) request.stated.value -= file.offset_mm;
+/// What the user typed, without a unit, thus in that of the file, becomes a place in the scan's local coordinates.
+scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::ScanFile& file) {
+  if (request.stated.kind == scan::Viewpoint::Kind::point) {
+    request.stated.value = request.stated.value * io::millimetres_per(file.unit) - file.offset_mm;
+  }
   // The origin, which `auto` would try, is kilometres away from points that needed an offset.
   if (!file.offset_mm.isZero(0.0) && !file.viewpoint_mm) request.automatic = false;
   return request;
 }
 
 Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, const Context& context) {
-  const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file, half.options);
+  const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file);
   std::optional<Eigen::Vector3d> file_viewpoint;
   if (file.viewpoint_mm) file_viewpoint = *file.viewpoint_mm - file.offset_mm;
   auto scan = scan::prepare_scan(file.cloud, file_viewpoint, request, half.options.scan, context);
@@ -41,7 +42,7 @@ Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, cons
 }
 
 void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::ScanFile& file) {
-  record.points = scan.cloud.size();
+  record.points = file.thinning ? file.thinning->points_in_file : scan.cloud.size();
   record.offset = file.offset_mm;
   record.noise_sigma = scan.noise_sigma_mm;
   record.spacing = scan.spacing_mm;
@@ -54,6 +55,12 @@ void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::Sca
     record.viewpoint_kind = "direction";
   }
   record.warnings = file.notes;
+  if (file.thinning) {
+    record.warnings.push_back(
+        fmt::format("Too large to be kept whole: the part was sought in {} of {} points, one in each cube of {:.3g} "
+                    "mm, and measured in all of them around it.",
+                    scan.cloud.size(), file.thinning->points_in_file, file.thinning->spacing_mm));
+  }
   record.warnings.insert(record.warnings.end(), scan.warnings.begin(), scan.warnings.end());
 }
 
@@ -195,6 +202,29 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     chosen_by_user = true;
   }
   if (chosen_by_user) verify::separate_segments(placements, *scan, half.model.prepared, context);
+  std::optional<CloserLook> closer;
+  const bool is_found =
+      std::ranges::any_of(placements, [](const auto& placement) { return !placement.segment.empty(); });
+  if (file.thinning && is_found) {
+    const auto taken = folder.stage("look_closer", file.name);
+    const scan::Viewpoint viewpoint = scan->viewpoint;
+    *scan = {};  // the memory is wanted for the closer look
+    ASBUILT_TRY(looked, look_closer(file, viewpoint, std::move(placements), half.model, half.options, context));
+    closer = std::move(looked);
+    placements = std::move(closer->placements);
+    if (closer->file.thinning) {
+      judged.record.warnings.push_back(
+          fmt::format("Even around the part there are more points than fit: one in each cube of {:.3g} mm was "
+                      "measured; raise --memory "
+                      "to measure all.",
+                      closer->file.thinning->spacing_mm));
+    }
+    judged.record.noise_sigma = closer->scan.noise_sigma_mm;
+    judged.record.spacing = closer->scan.spacing_mm;
+    judged.record.normals_oriented = closer->scan.normals_oriented;
+  }
+  const scan::Scan& cut_from = closer ? closer->scan : *scan;
+  const io::ScanFile& cut_from_file = closer ? closer->file : file;
   std::vector<JudgedScan> entries;
   for (const verify::Detection& detection : placements) {
     JudgedScan entry = judged;
@@ -202,7 +232,7 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
     entry.record.instances_in_scan = static_cast<int>(placements.size());
     describe_detection(entry.record, detection);
     if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
-    if (!detection.segment.empty()) entry.segment = cut_out(*scan, file, detection, half.model.prepared);
+    if (!detection.segment.empty()) entry.segment = cut_out(cut_from, cut_from_file, detection, half.model.prepared);
     entries.push_back(std::move(entry));
   }
   return entries;

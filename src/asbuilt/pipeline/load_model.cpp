@@ -32,6 +32,7 @@ Result<LoadedModel> load_model(const std::string& path, const Options& options, 
   {
     ASBUILT_TRY(content, io::FileContent::open(path));
     sha256 = io::sha256(content.view());
+    ASBUILT_CHECK(content.whole());
   }
   LoadedModel loaded;
   ASBUILT_TRY(prepared, model::is_prepared_file(path)

@@ -22,7 +22,7 @@ bool has_faces(const std::string& path, std::string_view content) {
 
 Result<PointCloud> points_of(const std::string& path, std::string_view content, const Options& options,
                              const Context& context) {
-  ASBUILT_TRY(files, io::scans_in(path, content, scan_reading(options)));
+  ASBUILT_TRY(files, io::scans_in(path, content, scan_reading(options, path)));
   PointCloud all;
   for (const io::ScanFile& file : files) {
     const PointCloud cloud = scan::sanitise(file.cloud, context).cloud;
@@ -51,6 +51,7 @@ Result<MeasuredCloud> measured_cloud(const std::string& path, const LoadedModel&
     }
   }
   ASBUILT_TRY(points, points_of(path, content.view(), options, context));
+  ASBUILT_CHECK(content.whole());
   measured.cloud = std::move(points);
   return measured;
 }

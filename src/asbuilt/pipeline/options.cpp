@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 
 #include "asbuilt/pipeline/scan_hints.h"
 
@@ -92,11 +93,19 @@ Result<void> Options::validate() const {
   for (const std::string& text : accept) {
     if (auto acceptance = parse_acceptance(text); !acceptance) return tl::unexpected(acceptance.error());
   }
+  for (const std::string& text : scan_units) {
+    if (auto unit = parse_unit_of_scan(text); !unit) return tl::unexpected(unit.error());
+  }
   return {};
 }
 
-io::ReadOptions scan_reading(const Options& options) {
+io::ReadOptions scan_reading(const Options& options, const std::string& path) {
   io::ReadOptions reading = options.scan_unit;
+  const std::string name = std::filesystem::path(path).stem().string();
+  for (const std::string& text : options.scan_units) {
+    const auto own = parse_unit_of_scan(text);  // validated before
+    if (own && names_scan(own->scan, path, name)) reading.unit = own->unit;
+  }
   reading.columns = options.columns;
   reading.camera = options.camera;
   return reading;
@@ -129,6 +138,7 @@ io::Options recorded(const Options& options, std::initializer_list<Half> halves)
   }
   if (wanted(Half::scan)) {
     record.emplace_back("scan_unit", unit_name(options.scan_unit));
+    record.emplace_back("scan_units", options.scan_units);
     record.emplace_back("columns", options.columns);
     record.emplace_back("camera", options.camera);
     record.emplace_back("viewpoint", options.viewpoint);
@@ -137,6 +147,7 @@ io::Options recorded(const Options& options, std::initializer_list<Half> halves)
     record.emplace_back("accept", options.accept);
     record.emplace_back("instances", std::string(kInstancesNames[static_cast<int>(options.instances)]));
     record.emplace_back("seed", static_cast<std::int64_t>(options.seed));
+    record.emplace_back("memory", options.memory_gb);
     record.emplace_back("paper_mode", options.paper_mode);
   }
   Options fields = options;  // the visitor wants something it may write to
@@ -173,6 +184,7 @@ Result<void> take_over(Options& options, const io::Options& record) {
   };
   ASBUILT_CHECK(assign("unit", options.model_unit));
   ASBUILT_CHECK(assign("scan_unit", options.scan_unit));
+  ASBUILT_CHECK(assign("scan_units", options.scan_units));
   ASBUILT_CHECK(assign("tessellation_tolerance", options.tessellation_tolerance));
   ASBUILT_CHECK(assign("columns", options.columns));
   ASBUILT_CHECK(assign("camera", options.camera));
@@ -182,6 +194,7 @@ Result<void> take_over(Options& options, const io::Options& record) {
   ASBUILT_CHECK(assign("accept", options.accept));
   ASBUILT_CHECK(assign("instances", options.instances));
   ASBUILT_CHECK(assign("seed", options.seed));
+  ASBUILT_CHECK(assign("memory", options.memory_gb));
   ASBUILT_CHECK(assign("paper_mode", options.paper_mode));
   ASBUILT_CHECK(assign("gauge", options.gauge));
   ASBUILT_CHECK(assign("mesh", options.mesh));
@@ -228,6 +241,17 @@ Result<Acceptance> parse_acceptance(std::string_view text) {
               fmt::format("--accept {}: expected SCAN:CANDIDATE, for example scan_03:1 (asbuilt explain lists the "
                           "candidates of a scan)",
                           text));
+}
+
+Result<UnitOfScan> parse_unit_of_scan(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("--scan-unit {}: expected UNIT or SCAN:UNIT, for example scan_03.ply:m", text));
+  }
+  const auto unit = io::unit_from_name(text.substr(colon + 1));
+  if (!unit) return fail(unit.error().code, fmt::format("--scan-unit {}: {}", text, unit.error().message));
+  return UnitOfScan{std::string(text.substr(0, colon)), *unit};
 }
 
 }  // namespace asbuilt::pipeline

@@ -36,6 +36,7 @@ enum class Alignment { as_refined, best_fit };
 /// Everything a user can choose; the stages' own options and what lies between them.
 struct Options {
   io::Unit model_unit = io::Unit::stated, scan_unit = io::Unit::stated;
+  std::vector<std::string> scan_units;   ///< SCAN:UNIT, where a scan's unit is not `scan_unit`
   double tessellation_tolerance = 1e-4;  ///< of STEP, IGES and BREP models: triangles to surface / diameter
   std::string columns;                   ///< of text scans, "x,y,z,nx,ny,nz,-,r,g,b,i"; empty: read or guessed
   std::string camera;                    ///< of depth images, "fx,fy,cx,cy" or a file; empty: a file beside them
@@ -45,6 +46,7 @@ struct Options {
   std::vector<std::string> accept;       ///< SCAN:CANDIDATE, candidates counted from 0 as in result.json
   Instances instances = Instances::one;
   std::uint64_t seed = 0;
+  double memory_gb = 0.0;   ///< what a scan may take; beyond it, it is thinned first; 0: half of the machine's
   bool paper_mode = false;  ///< exactly the published method, in every stage
   bool mesh = false;        ///< a surface mesh beside the cloud
   Gauge gauge = Gauge::best_fit;
@@ -92,8 +94,8 @@ void for_each_stage_field(Options& options, Visitor&& field) {
   for_each_field(options.inspect, of(Half::joint, "inspect_"));
 }
 
-/// How scans and models are read.
-[[nodiscard]] io::ReadOptions scan_reading(const Options& options);
+/// How the scans of a file and models are read.
+[[nodiscard]] io::ReadOptions scan_reading(const Options& options, const std::string& path);
 [[nodiscard]] io::ModelReadOptions model_reading(const Options& options);
 
 /// The options with paper mode handed down to every stage.
@@ -118,5 +120,12 @@ struct Acceptance {
   int candidate = 0;
 };
 [[nodiscard]] Result<Acceptance> parse_acceptance(std::string_view text);
+
+/// "SCAN:UNIT" of --scan-unit.
+struct UnitOfScan {
+  std::string scan;
+  io::Unit unit = io::Unit::millimetre;
+};
+[[nodiscard]] Result<UnitOfScan> parse_unit_of_scan(std::string_view text);
 
 }  // namespace asbuilt::pipeline

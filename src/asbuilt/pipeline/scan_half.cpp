@@ -11,6 +11,7 @@
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/pipeline/as_detected.h"
 #include "asbuilt/pipeline/judge_scan.h"
+#include "asbuilt/pipeline/memory_budget.h"
 #include "asbuilt/pipeline/pipeline_version.h"
 #include "asbuilt/pipeline/scan_hints.h"
 #include "asbuilt/pipeline/unit_check.h"
@@ -128,6 +129,14 @@ Result<void> check_names(std::span<const std::string> scan_paths, const Options&
     if (known(typed)) continue;
     return fail(ErrorCode::invalid_argument, fmt::format("--exclude {}: none of the scans has this name", typed));
   }
+  for (const std::string& text : options.scan_units) {
+    ASBUILT_TRY(own, parse_unit_of_scan(text));
+    const bool is_there = std::ranges::any_of(scan_paths, [&](const std::string& path) {
+      return names_scan(own.scan, path, fs::path(path).stem().string());
+    });
+    if (is_there) continue;
+    return fail(ErrorCode::invalid_argument, fmt::format("--scan-unit {}: none of the scans has this name", text));
+  }
   for (const std::string& text : options.accept) {
     ASBUILT_TRY(acceptance, parse_acceptance(text));
     if (known(acceptance.scan)) continue;
@@ -158,8 +167,9 @@ class ScanHalfRun {
   [[nodiscard]] Result<void> take(const std::string& path) {
     InputFile input = [&] {
       const auto timed = folder_.stage("read", fs::path(path).stem().string());
-      return read_input(path, half_.options);
+      return read_input(path, half_.options, context_);
     }();
+    if (!input.scans && input.scans.error().code == ErrorCode::cancelled) return tl::unexpected(input.scans.error());
     return take(input);
   }
 
@@ -267,10 +277,15 @@ double spacing_of_found(const io::RunRecord& record) {
 
 }  // namespace
 
-InputFile read_input(const std::string& path, const Options& options) {
+InputFile read_input(const std::string& path, const Options& options, const Context& context) {
   const auto content = io::FileContent::open(path);
   if (!content) return {path, "", tl::unexpected(content.error())};
-  return {path, io::sha256(content->view()), io::scans_in(path, content->view(), scan_reading(options))};
+  io::ReadOptions reading = scan_reading(options, path);
+  reading.sieve = sieve_for(path, MemoryBudget(options.memory_gb), context);
+  InputFile input{path, io::sha256(content->view()), io::scans_in(path, content->view(), reading)};
+  if (const auto whole = content->whole(); !whole) input.scans = tl::unexpected(whole.error());
+  if (context.cancelled()) input.scans = fail(ErrorCode::cancelled, "interrupted");
+  return input;
 }
 
 ScanHalf SharedByScans::half(const LoadedModel& model, const Options& options) const {
@@ -280,7 +295,7 @@ ScanHalf SharedByScans::half(const LoadedModel& model, const Options& options) c
 Result<SharedByScans> shared_by_scans(const LoadedModel& model, const Options& options, RunFolder& folder,
                                       const Context& context) {
   SharedByScans shared;
-  ASBUILT_TRY(viewpoints, Viewpoints::from_text(options.viewpoint, options.scan_unit));
+  ASBUILT_TRY(viewpoints, Viewpoints::from_text(options.viewpoint, io::Unit::stated));
   shared.viewpoints = std::move(viewpoints);
   if (!options.poses.empty()) {
     ASBUILT_TRY(read, io::read_poses(options.poses, io::Unit::millimetre));
@@ -314,16 +329,21 @@ void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFold
     if (scan.reason_code == "scan_too_small" || scan.reason_code == "wrong_unit") continue;
     if (tried++ == kScansTriedWithOtherUnits || context.cancelled()) return;
     const auto timed = folder.stage("try_units", scan.name);
-    const auto files = io::read_scans(scan.path, scan_reading(half.options));
+    io::ReadOptions reading = scan_reading(half.options, scan.path);
+    const auto sieve = sieve_for(scan.path, MemoryBudget(half.options.memory_gb), context);
+    sieve->announced = {};  // said when it was read first
+    reading.sieve = sieve;
+    const auto files = io::read_scans(scan.path, reading);
     if (!files || static_cast<std::size_t>(scan.index_in_file) >= files->size()) continue;
     const io::ScanFile& file = (*files)[static_cast<std::size_t>(scan.index_in_file)];
     const auto factor = factor_that_finds_the_part(file, half.model.prepared, half.codebook, half.options, context);
     if (!factor) continue;
     scan.reason_code = verify::code_of(verify::Reason::wrong_unit);
+    // Where the part was found in other scans, the flag must be for this one alone.
     scan.reason = fmt::format(
-        "the part is not there at this size, but it is when the scan is {:g} times as large: try {}{}", *factor,
-        flag_for_factor(*factor, with_units_read(half, file)),
-        usual_spacing > 0.0 ? " for this scan alone, in a detect run of its own that register then joins" : "");
+        "the part is not there at this size, but it is when the scan is {:g} times as large: try {}", *factor,
+        flag_for_factor(*factor, with_units_read(half, file),
+                        usual_spacing > 0.0 ? fs::path(scan.path).filename().string() : std::string()));
     if (usual_spacing == 0.0) return;
   }
 }

@@ -36,7 +36,7 @@ struct InputFile {
   std::string path, sha256;
   Result<std::vector<io::ScanFile>> scans;
 };
-[[nodiscard]] InputFile read_input(const std::string& path, const Options& options);
+[[nodiscard]] InputFile read_input(const std::string& path, const Options& options, const Context& context);
 
 /// What all scans of a run share, made once.
 struct SharedByScans {

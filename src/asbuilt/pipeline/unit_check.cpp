@@ -53,9 +53,9 @@ std::vector<double> plausible_factors(double scan_extent_mm, double diameter_mm)
   return factors;
 }
 
-std::string flag_for_factor(double factor, const Options& options) {
+std::string flag_for_factor(double factor, const Options& options, const std::string& scan) {
   if (const auto unit = unit_of(factor * io::millimetres_per(options.scan_unit))) {
-    return fmt::format("--scan-unit {}", io::name_of(*unit));
+    return fmt::format("--scan-unit {}{}", scan.empty() ? "" : scan + ":", io::name_of(*unit));
   }
   if (const auto unit = unit_of(io::millimetres_per(options.model_unit) / factor)) {
     return fmt::format("--unit {}", io::name_of(*unit));

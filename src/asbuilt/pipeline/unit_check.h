@@ -23,8 +23,9 @@ namespace asbuilt::pipeline {
 /// Factors by which a mistaken unit scales a scan, and that bring this one to a plausible size.
 [[nodiscard]] std::vector<double> plausible_factors(double scan_extent_mm, double diameter_mm);
 
-/// The flag that would scale the scan by `factor` against the model, for example "--scan-unit m".
-[[nodiscard]] std::string flag_for_factor(double factor, const Options& options);
+/// The flag that would scale the scan by `factor` against the model, for example "--scan-unit m"; with a scan's name,
+/// the one for it alone, "--scan-unit scan_03.ply:m".
+[[nodiscard]] std::string flag_for_factor(double factor, const Options& options, const std::string& scan = {});
 
 /// Whether the part would be found if the scan were of another unit: tries the plausible factors on a thinned copy.
 /// Gives the first that verification accepts.

@@ -20,6 +20,7 @@ TEST(Options, HaveNamesThatNoTwoShare) {
 TEST(Options, ComeBackFromTheRecord) {
   Options options;
   options.scan_unit = io::Unit::metre;
+  options.scan_units = {"scan_03.ply:inch"};
   options.viewpoint = "1,2,3";
   options.exclude = {"scan_01"};
   options.seed = 42;
@@ -34,6 +35,7 @@ TEST(Options, ComeBackFromTheRecord) {
   ASSERT_TRUE(take_over(back, record).has_value());
   EXPECT_EQ(recorded(back, everything), record);
   EXPECT_EQ(back.scan_unit, io::Unit::metre);
+  EXPECT_EQ(back.scan_units, options.scan_units);
   EXPECT_EQ(back.instances, Instances::all);
   EXPECT_EQ(back.detect.angle_bins, 17);
   EXPECT_FALSE(back.scan.use_file_normals);
@@ -54,6 +56,21 @@ TEST(Acceptance, IsAScanAndACandidate) {
   EXPECT_EQ(acceptance->candidate, 2);
   for (const char* text : {"", "scan", "scan:", ":1", "scan:x", "scan:-1", "scan:1x"}) {
     EXPECT_FALSE(parse_acceptance(text).has_value()) << text;
+  }
+}
+
+TEST(PipelineOptions, AScanMayHaveAUnitOfItsOwn) {
+  Options options;
+  options.scan_unit = io::Unit::metre;
+  options.scan_units = {"scan_01:inch", "b/scan_02.ply:foot", "C:\\odd:name.ply:cm"};
+  ASSERT_TRUE(options.validate());
+  EXPECT_EQ(scan_reading(options, "a/scan_00.ply").unit, io::Unit::metre);
+  EXPECT_EQ(scan_reading(options, "a/scan_01.ply").unit, io::Unit::inch);
+  EXPECT_EQ(scan_reading(options, "b/scan_02.ply").unit, io::Unit::foot);
+  EXPECT_EQ(scan_reading(options, "C:\\odd:name.ply").unit, io::Unit::centimetre);
+  for (const char* wrong : {"scan_01", ":m", "scan_01:", "scan_01:mile"}) {
+    options.scan_units = {wrong};
+    EXPECT_FALSE(options.validate()) << wrong;
   }
 }
 

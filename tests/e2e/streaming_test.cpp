@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scan that does not fit into the memory it may take gives what it gives when it does.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "asbuilt/pipeline.h"
+#include "asbuilt/simulate/simulate.h"
+#include "support/parts.h"
+
+namespace asbuilt {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// How far apart two poses put the part: RMS over its vertices, as for the relative pose error of architecture.md.
+double rms_shift_mm(const Pose& a, const Pose& b, const TriangleMesh& part) {
+  double sum = 0.0;
+  for (const Eigen::Vector3d& v : part.vertices) sum += (a * b.inverse() * v - v).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(part.vertices.size()));
+}
+
+TEST(Streaming, AScanForcedThroughTheSieveGivesTheSameVerdictAndNearlyTheSamePose) {
+  const fs::path base = fs::path(testing::TempDir()) / "asbuilt_streaming";
+  fs::remove_all(base);
+  const auto simulation = simulate::simulate(
+      test::casing(), {.scans = 3, .points = 120000, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2));
+  ASSERT_TRUE(simulation) << simulation.error().message;
+  ASSERT_TRUE(simulate::write_simulation(base, *simulation));
+  std::vector<std::string> scans;
+  for (const auto& scan : simulation->scans) scans.push_back((base / (scan.name + ".ply")).string());
+
+  const auto detected = [&](double memory_gb, const std::string& output, Context context) {
+    pipeline::Options options;
+    options.memory_gb = memory_gb;
+    return pipeline::detect((base / "model.ply").string(), scans, options, {base / output, false, {}}, context);
+  };
+  const auto whole = detected(8.0, "whole", Context(2));
+  ASSERT_TRUE(whole) << whole.error().message;
+  std::vector<std::string> warnings;
+  Context context(2);
+  context.warning = [&](std::string_view text) { warnings.emplace_back(text); };
+  // Room for 80 000 points: too little for a scan, enough for what lies around the part.
+  const auto streamed = detected(0.2176, "streamed", context);
+  ASSERT_TRUE(streamed) << streamed.error().message;
+  EXPECT_THAT(warnings, testing::Contains(testing::HasSubstr("points would need about 0.2 GB of memory")));
+
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const io::ScanRecord &a = whole->scans[i], &b = streamed->scans[i];
+    EXPECT_EQ(a.status, b.status) << a.name << ": " << a.reason << " / " << b.reason;
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_THAT(b.warnings, testing::Contains(testing::HasSubstr("Too large to be kept whole")));
+    if (!a.model_from_scan || !b.model_from_scan) continue;
+    ++compared;
+    EXPECT_LT(rms_shift_mm(*a.model_from_scan, *b.model_from_scan, simulation->model), 0.5 * simulation->noise_sigma_mm)
+        << a.name;
+    // The segment is cut out of all points, not of the thinned ones.
+    EXPECT_NEAR(static_cast<double>(b.segment_points) / static_cast<double>(a.segment_points), 1.0, 0.02) << a.name;
+  }
+  EXPECT_GE(compared, 1u) << "nothing was compared";
+  fs::remove_all(base);
+}
+
+}  // namespace
+}  // namespace asbuilt
