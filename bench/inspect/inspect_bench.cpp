@@ -94,8 +94,8 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
   // What the smooth warp does is within tolerance, with one sigma to spare; what was planted is not.
   const double limit = scene.as_built.warp_ratio * diameter(cad) + sigma;
   choice.inspect.tolerance = inspect::Tolerance{-limit, limit};
-  const auto record =
-      pipeline::reconstruct((folder / "model.ply").string(), scans, choice, {folder / "result", false, {}, {}}, context);
+  const auto record = pipeline::reconstruct((folder / "model.ply").string(), scans, choice,
+                                            {folder / "result", false, {}, {}}, context);
   if (!record) return {{"scene", number}, {"error", record.error().message}};
 
   const InspectionTruth truth(simulation);
@@ -110,7 +110,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
     wrongly += spot.scanned && !seen;
     missed += !spot.scanned && seen;
     if (!spot.scanned) continue;
-    const auto deviation = truth.deviation(spot.position, spot.normal);
+    const auto deviation = truth.deviation(spot.position);
     if (!deviation) continue;
     measured.push_back(spot.deviation);
     expected.push_back(*deviation);
@@ -135,7 +135,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
     for (const MeasuredSpot& spot : spots) {
       if (!spot.scanned || (spot.position - bump.centre_in_model).norm() > 0.7 * bump.radius_mm) continue;
       ++around;
-      const auto deviation = truth.deviation(spot.position, spot.normal);
+      const auto deviation = truth.deviation(spot.position);
       if (deviation && deviation.value() * bump.height_mm > 0.0 && std::abs(*deviation) > std::abs(peak))
         peak = *deviation;
     }
@@ -148,7 +148,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
       if (!used[r] && !entry.contains("peak")) {
         const double error = report["regions"][r]["peak_standard_error"].get<double>();
         // At the very place where the peak was found.
-        const auto there = truth.deviation(place, bump.normal);
+        const auto there = truth.deviation(place);
         entry["peak"] = found;
         entry["standard_error"] = error;
         entry["true_at_peak"] = there.value_or(peak);

@@ -6,6 +6,7 @@
 
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/model/ray_scene.h"
+#include "asbuilt/model/surface_distance.h"
 #include "asbuilt/simulate/simulate.h"
 
 namespace asbuilt::bench {
@@ -19,11 +20,12 @@ class InspectionTruth {
   /// and where none come) and nothing of the part stands between.
   [[nodiscard]] bool is_visible(const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
 
-  /// Distance of the true surface from the CAD along the normal; nothing if it is not met within 2 % of the diameter.
-  [[nodiscard]] std::optional<double> deviation(const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
+  /// Distance of the true surface from a place of the CAD, positive outside; nothing beyond 2 % of the diameter.
+  [[nodiscard]] std::optional<double> deviation(const Eigen::Vector3d& position) const;
 
  private:
-  model::RayScene as_built_;
+  model::RayScene rays_;
+  model::SurfaceDistance surface_;
   double reach_mm_;
   std::vector<Eigen::Vector3d> sensors_in_model_;
 };

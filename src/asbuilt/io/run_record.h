@@ -112,7 +112,7 @@ struct DeviationRecord {
   double mean = 0.0, sigma = 0.0, rms = 0.0, p95 = 0.0;
   std::optional<double> in_tolerance;
   double coverage = 0.0;
-  std::string verdict;  ///< "pass", "fail", "not enough data" or "not scanned"; empty without a tolerance
+  std::string verdict = {};  ///< "pass", "fail", "not enough data" or "not scanned"; empty without a tolerance
 };
 
 /// result.json, schema 1 (docs/result-json.md). Lengths in mm, poses in the coordinates of the files.

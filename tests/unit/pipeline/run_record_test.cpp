@@ -47,7 +47,7 @@ RunRecord example() {
   record.scans = {scan, ScanRecord{}};
   record.graph = GraphRecord{{{0, 1, 0.25, true}}, {{0, 1}}};
   record.refinement = {RefinementRecord{}};
-  record.deviation = DeviationRecord{0.1, 0.2, 0.3, 0.4, std::nullopt, 0.5};
+  record.deviation = DeviationRecord{0.1, 0.2, 0.3, 0.4, std::nullopt, 0.5, "fail"};
   return record;
 }
 
