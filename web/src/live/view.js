@@ -19,6 +19,9 @@ const kMostScans = 4;
 const kAges = 6;
 const firmness = { firm: [43, 108, 176], fair: [120, 160, 205], weak: [214, 130, 0] };
 
+/** A scan's own number if its name ends in one, so that the picture and the names agree. */
+const number_in = (scan) => scan.name.match(/\d{1,3}$/)?.[0] ?? String(scan.arrival + 1);
+
 export class LiveView {
   constructor(select) {
     this.select = select;
@@ -114,7 +117,7 @@ export class LiveView {
     const apart = state.pieces.length > 1;
     const colour = (scan) => apart && scan.component !== null ? category_colour(3 * scan.component) : [44, 84, 128];
     const sensors = state.scans.filter((scan) => scan.viewpoint && scan.component !== null).map((scan) => ({
-      id: key_of(scan), position: scan.viewpoint, direction: scan.view_direction, colour: colour(scan), label: String(scan.arrival + 1), title: scan.name, kind: key_of(scan) === this.chosen ? 'chosen' : '' }));
+      id: key_of(scan), position: scan.viewpoint, direction: scan.view_direction, colour: colour(scan), label: number_in(scan), title: scan.name, kind: key_of(scan) === this.chosen ? 'chosen' : '' }));
     const ghosts = state.views.map((view, i) => ({ id: `view ${i}`, position: view.position, direction: view.direction, target: view.target, colour: i === 0 ? [0, 140, 90] : [110, 175, 145], label: letter_of(i), title: view.text, ghost: true, kind: 'ghost' }));
     const links = state.links.filter((link) => link.used).map((link) => ({ from: key_of(state.scans[link.a]), to: key_of(state.scans[link.b]), overlap: link.overlap, colour: firmness[link.firmness] ?? firmness.weak }));
     this.sensors.set([...sensors, ...ghosts], links);

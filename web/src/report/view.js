@@ -3,7 +3,7 @@
 import { Vector3 } from 'three';
 import { category_colour } from '../shared/colours.js';
 import { h } from '../shared/dom.js';
-import { kNone, number, place, signed, signed_mm } from '../shared/format.js';
+import { kNone, number, percent, place, short, signed, signed_mm } from '../shared/format.js';
 import { Sensors } from '../shared/sensors.js';
 import { corner_at, value_at } from '../shared/surface.js';
 import { verdict_badge } from '../shared/verdict.js';
@@ -47,6 +47,7 @@ export class ReportView {
     this.mode = this.modes.find((mode) => mode.id === id);
     for (const button of this.buttons) button.setAttribute('aria-pressed', String(button.dataset.mode === id));
     this.viewer.set_values(this.mode.values);
+    if (this.sensors) this.#set_sensors();
     this.#recolour();
     this.#show_options();
   }
@@ -109,15 +110,21 @@ export class ReportView {
     this.sensors_on = on;
     if (!this.sensors) {
       this.sensors = new Sensors(this.viewer, this.host);
-      const name = (index) => this.report.scans[index]?.name ?? `scan ${index}`;
-      const sensors = this.scene.poses.filter((pose) => pose.sensor).map((pose) => ({
-        id: pose.scan, position: pose.sensor, colour: category_colour(pose.scan), label: String(pose.scan), title: name(pose.scan) }));
-      const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, overlap: link.overlap, colour: [120, 132, 146] }));
-      this.sensors.set(sensors, links);
+      this.#set_sensors();
     }
     this.sensors.visible = on;
     this.viewer.others = on ? this.sensors.places() : [];
     this.viewer.show_all();
+  }
+
+  /** Sensors have the colours of their scans where the part has them, too. */
+  #set_sensors() {
+    const colour = (scan) => (this.mode.id === 'scan' ? category_colour(scan) : [44, 84, 128]);
+    const name = (index) => this.report.scans[index]?.name ?? `scan ${index}`;
+    const sensors = this.scene.poses.filter((pose) => pose.sensor).map((pose) => ({
+      id: pose.scan, position: pose.sensor, colour: colour(pose.scan), label: String(pose.scan), title: name(pose.scan) }));
+    const links = (this.report.graph?.links ?? []).filter((link) => link.linked).map((link) => ({ from: link.a, to: link.b, overlap: link.overlap, colour: [120, 132, 146] }));
+    this.sensors.set(sensors, links);
   }
 
   /** Flies to {region: i}, {face: i} or {scan: i}, and marks it where the colouring can. */
@@ -132,8 +139,23 @@ export class ReportView {
     if (!sight) return;
     const least = this.scene.box.diameter * (what.region !== undefined ? 0.09 : 0.14);
     this.viewer.fly_to({ target: sight.centre, direction: sight.direction, radius: Math.max(least, sight.radius * 1.5) });
-    if (what.region !== undefined) this.#mark(this.report.regions[index].peak_at);
+    this.#show_chosen(what);
     this.element.scrollIntoView({ block: 'nearest', behavior: 'smooth' });
+  }
+
+  /** The figures of a region or face that was flown to. */
+  #show_chosen({ region, face }) {
+    const d = this.report.decimals;
+    if (region !== undefined) {
+      const { peak, peak_at, peak_standard_error: error, excess, face_name, area } = this.report.regions[region];
+      this.readout.replaceChildren(h('p', { class: 'value' }, signed(peak, d), h('small', null, `${typeof error === 'number' ? ` ± ${number(error, d + 1)}` : ''} mm at its peak`)),
+        h('dl', null, line('region', `${region + 1}, ${short(area)} mm²`), line('beyond', signed_mm(excess, d)), line('face', face_name ?? kNone), line('x, y, z', place(peak_at, 2))));
+      return this.#mark(peak_at);
+    }
+    const { name, verdict, coverage, mean, sigma, in_tolerance } = this.report.faces[face];
+    this.readout.replaceChildren(h('p', { class: 'value' }, name), h('dl', null, verdict && line('verdict', verdict_badge(verdict)), line('scanned', percent(coverage)),
+      typeof in_tolerance === 'number' && line('within', percent(in_tolerance)), line('mean', `${signed_mm(mean, d)}, std. dev. ${number(sigma, d)}`)));
+    this.#mark(null);
   }
 
   #mark(point) {

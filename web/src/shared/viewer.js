@@ -217,7 +217,7 @@ export class Viewer {
     const target = new WebGLRenderTarget(width, height, { samples });
     const shown = this.extras.visible;
     this.extras.visible = false;
-    this.material.uniforms.hatch.value = 9;
+    this.material.uniforms.hatch.value = 14;
     this.renderer.setRenderTarget(target);
     this.renderer.setClearColor(0xffffff, 1);
     this.renderer.render(this.scene, camera);
