@@ -111,7 +111,7 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   if (arguments.no_result || session->state()->scans.empty()) return kDone;
   ASBUILT_TRY(record, session->write_result({}));
   shell.print_result(summary_of(record, (std::filesystem::path(output) / "result").string()));
-  return exit_code_of(record, arguments.options);
+  return exit_code_of(record);
 }
 
 }  // namespace

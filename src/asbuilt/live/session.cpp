@@ -18,6 +18,7 @@
 #include "asbuilt/live/scan_store.h"
 #include "asbuilt/live/words.h"
 #include "asbuilt/pipeline/collect_runs.h"
+#include "asbuilt/pipeline/inspection_inputs.h"
 #include "asbuilt/pipeline/joint_half.h"
 #include "asbuilt/pipeline/run_folder.h"
 #include "asbuilt/pipeline/scan_half.h"
@@ -885,7 +886,8 @@ Result<io::RunRecord> LiveSession::write_result(std::stop_token stop) {
     pipeline::look_for_mistaken_unit(record, half, folder, stoppable);
     record.options =
         pipeline::merged(std::move(record.options), pipeline::recorded(own.options.pipeline, {pipeline::Half::joint}));
-    ASBUILT_CHECK(pipeline::register_scans(own.model, own.options.pipeline, folder, record, stoppable));
+    ASBUILT_TRY(inspection, pipeline::inspection_inputs(own.options.pipeline));
+    ASBUILT_CHECK(pipeline::register_scans(own.model, own.options.pipeline, inspection, folder, record, stoppable));
     ASBUILT_CHECK(folder.finish(record));
     return std::move(record);
   };
