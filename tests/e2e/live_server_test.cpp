@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
-#include <httplib.h>
 
 #include <condition_variable>
 #include <mutex>
@@ -9,6 +8,9 @@
 
 #include "live_scenes.h"
 #include "watch_loop.h"
+
+// After everything that includes Eigen: <resolv.h>, which this brings, has a macro named _res.
+#include <httplib.h>
 
 namespace asbuilt::viewer {
 namespace {

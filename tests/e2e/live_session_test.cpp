@@ -123,7 +123,8 @@ TEST_F(LiveSessionTest, AFirstLookAtALargeScanIsFollowedByTheWholeAndChangesNoth
 TEST_F(LiveSessionTest, WhatIsNoScanIsAnEntryThatFailedAndSaysWhy) {
   simulate_scenes(1, 25);
   auto session = open();
-  io::write_file(watched() / "half.ply", io::read_file(base_ / "scenes" / names_[0]).value().substr(0, 5000)).value();
+  const std::string whole = io::read_file(base_ / "scenes" / names_[0]).value();
+  ASSERT_TRUE(io::write_file(watched() / "half.ply", whole.substr(0, 5000)).has_value());
   ASSERT_TRUE(session->add((watched() / "half.ply").string()).has_value());
   const auto state = session->state();
   ASSERT_EQ(state->scans.size(), 1U);

@@ -108,6 +108,7 @@ struct LiveSession::Implementation {
   std::optional<graph::PoseGraphBuilder> builder;
   std::map<std::string, FileEntries> files;  // canonical order
   std::vector<Entry*> nodes;                 // of the graph
+  std::optional<graph::PoseGraph> joint;     // what the joint refinement decided, until scans come or go
   std::map<std::pair<std::string, std::string>, double> edge_rms;
   std::map<std::string, std::string> duplicates;  // file, of which
   std::map<std::string, std::string> duplicate_paths;
@@ -149,11 +150,13 @@ struct LiveSession::Implementation {
 
   void insert_node(Entry& entry) {
     if (!entry.in_use()) return;
+    joint.reset();
     const auto node = builder->insert({entry.posed->part, entry.posed->model_from_local}, context);
     if (node) nodes.push_back(&entry);
   }
 
   void rebuild_graph() {
+    joint.reset();
     builder = *graph::PoseGraphBuilder::create(model.prepared, options.pipeline.graph);  // validated in open
     nodes.clear();
     for (auto& [file, group] : files) {
@@ -161,7 +164,10 @@ struct LiveSession::Implementation {
     }
   }
 
-  [[nodiscard]] graph::PoseGraph graph() const { return nodes.empty() ? graph::PoseGraph() : builder->graph(); }
+  [[nodiscard]] graph::PoseGraph graph() const {
+    if (joint) return *joint;
+    return nodes.empty() ? graph::PoseGraph() : builder->graph();
+  }
 
   /// Fits a scan that has just come to those it is linked to, which stay where they are.
   void fit_to_neighbours(Entry& entry) const {
@@ -858,6 +864,8 @@ Result<bool> LiveSession::refine_jointly(std::stop_token stop) {
   }
   for (Entry* entry : entries) own.see(*entry);
   own.rebuild_graph();
+  // Both number the scans in canonical order; the joint graph saw all points, the other one a picture's worth.
+  if (own.nodes.size() == registration->scans.size()) own.joint = registration->graph;
   own.due = false;
   own.next.phase = "waiting";
   own.next.refinement = "done";

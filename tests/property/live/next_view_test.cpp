@@ -102,6 +102,7 @@ TEST(NextBestView, TakesAtLeastThirtyPercentFewerScansThanRandomViews) {
     RecordProperty(std::string(name), std::to_string(with_advice) + " / " + std::to_string(at_random));
     std::printf("%-14s %2d scans with advice, %.1f at random, coverable %.1f %%\n", name, with_advice, at_random,
                 100.0 * coverable);
+    std::fflush(stdout);
   }
 }
 
