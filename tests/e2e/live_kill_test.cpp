@@ -56,8 +56,8 @@ TEST_F(LiveScenes, KilledAtAnyMomentItGoesOnAndEndsWithTheSameBytes) {
   std::size_t given = 0;
   for (int i = 0; i < kills; ++i) {
     Program program(model(), watched(), output());
-    // Scans come in while it runs; the last of them at the latest with the last kill.
-    while (given < names_.size() &&
+    // Scans come in while it runs; the last of them after the last kill.
+    while (given + 1 < names_.size() &&
            given * static_cast<std::size_t>(kills) <= names_.size() * static_cast<std::size_t>(i)) {
       put(names_[given++]);
     }
@@ -65,12 +65,12 @@ TEST_F(LiveScenes, KilledAtAnyMomentItGoesOnAndEndsWithTheSameBytes) {
     std::this_thread::sleep_for(std::chrono::milliseconds(std::uniform_int_distribution<int>(50, 4500)(random)));
     program.end(SIGKILL);
   }
-  while (given < names_.size()) put(names_[given++]);
   const auto all_stored = [&] {
     return std::ranges::all_of(
         names_, [&](const std::string& name) { return fs::exists(output() / "scans" / name / "live.json"); });
   };
   Program program(model(), watched(), output());
+  while (given < names_.size()) put(names_[given++]);  // the last one: once it is stored, the program is up
   for (int i = 0; i < 6000 && !all_stored(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
   ASSERT_TRUE(all_stored());
   const int status = program.end(SIGINT);
