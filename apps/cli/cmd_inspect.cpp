@@ -58,7 +58,6 @@ void add_inspect_command(CLI::App& app, Shell& shell) {
   command->footer(
       "Examples:\n"
       "  asbuilt inspect part.stl result/reconstruction.ply -o deviation\n"
-      "  asbuilt inspect part.stl measured.stl -o deviation --tolerance -0.2,0.2 --json\n"
       "  asbuilt inspect part.step cloud.ply -o deviation --tolerance tolerances.csv --alignment best-fit --views");
   run_on_call(*command, shell, [arguments, &shell] { return run(*arguments, shell); });
 }

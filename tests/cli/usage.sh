@@ -4,7 +4,7 @@
 expect 0 --version
 grep -q '^asbuilt [0-9]' stdout || fail "--version does not tell the version"
 expect 0 --help
-for verb in reconstruct prepare detect register inspect explain simulate evaluate info; do
+for verb in reconstruct prepare detect register inspect explain simulate evaluate info export live; do
   expect 0 "$verb" --help
   [ "$(grep -c "^  asbuilt $verb " stdout)" -eq 2 ] || fail "asbuilt $verb --help does not end with two examples"
 done

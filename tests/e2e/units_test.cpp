@@ -113,8 +113,8 @@ class Units : public testing::Test {
     return record.value_or(io::RunRecord{});
   }
 
-  /// Same words about each scan, and poses that agree to a quarter of the noise at the part.
-  void expect_same(const io::RunRecord& found, const io::RunRecord& expected) const {
+  /// Same words about each scan, and poses that agree to a share of the noise at the part.
+  void expect_same(const io::RunRecord& found, const io::RunRecord& expected, double sigmas = 0.25) const {
     ASSERT_EQ(found.scans.size(), expected.scans.size());
     EXPECT_NEAR(found.model.diameter, expected.model.diameter, 1e-3 * expected.model.diameter);
     std::size_t accepted = 0;
@@ -128,7 +128,7 @@ class Units : public testing::Test {
         part_in_scan.push_back(reference.model_from_scan->inverse() * v);
       }
       EXPECT_LT(largest_difference_mm(*scan.model_from_scan, *reference.model_from_scan, part_in_scan),
-                0.25 * simulation_.noise_sigma_mm)
+                sigmas * simulation_.noise_sigma_mm)
           << scan.name;
     }
     EXPECT_GE(accepted, 1u) << "nothing was compared";
@@ -176,10 +176,13 @@ TEST_F(Units, TheFrameInInchAndScansInMetresGiveWhatMillimetresGive) {
   const auto mesh = io::read_mesh(cad / "frame.stl", io::Unit::millimetre);
   ASSERT_TRUE(mesh) << mesh.error().message;
   simulate_scans(*mesh, {.scans = 3, .points = 60000, .seed = 7, .as_built = {}});
-  const auto expected = detected(cad / "frame.stl", written("mm", {io::Unit::millimetre}), {}, "all_mm");
+  const auto scans_in_mm = written("mm", {io::Unit::millimetre});
   pipeline::Options options;
   options.scan_unit = io::Unit::metre;
-  expect_same(detected(cad / "frame.step", written("m", {io::Unit::metre}), options, "inch_and_m"), expected);
+  const auto found = detected(cad / "frame.step", written("m", {io::Unit::metre}), options, "inch_and_m");
+  expect_same(found, detected(cad / "frame.step", scans_in_mm, {}, "inch_and_mm"));
+  // Another tessellation is sampled at other places, of which poses detected from few points feel a little.
+  expect_same(found, detected(cad / "frame.stl", scans_in_mm, {}, "all_mm"), 0.75);
 }
 
 }  // namespace

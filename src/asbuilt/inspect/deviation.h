@@ -33,7 +33,7 @@ struct InspectOptions {
       0.0;  ///< how far about a check point the surface is looked for; 0: 1 % of the diameter
 
   std::optional<Tolerance> tolerance;  ///< of all faces that no row of `tolerances` names
-  ToleranceTable tolerances = {};           ///< one per CAD face or box
+  ToleranceTable tolerances = {};      ///< one per CAD face or box
   AlignmentOptions alignment = {};
   std::vector<ReferencePoint> reference = {};  ///< check points
 

@@ -317,8 +317,7 @@ Result<void> take_scans(InputFile& input, const ScanHalf& half, RunFolder& folde
   return run.take(input);
 }
 
-void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder,
-                            const Context& context) {
+void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFolder& folder, const Context& context) {
   constexpr double kFarOff = 5.0;
   const double usual_spacing = spacing_of_found(record);
   std::size_t tried = 0;

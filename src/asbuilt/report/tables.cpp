@@ -94,10 +94,11 @@ std::string scans_csv(const ReportInput& input) {
     const LinkSummary links = links_of(input.record, static_cast<int>(i));
     const PlaceError error = place_error(scan, input.model.box.center());
     text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", i, csv_field(scan.name),
-                        csv_field(scan.path), io::name_of(scan.status), scan.reason_code, csv_field(scan.reason), scan.points,
-                        scan.segment_points, number(scan.noise_sigma), number(scan.score), number(scan.visible_share),
-                        number(scan.normal_agreement), scan.component ? fmt::format("{}", *scan.component) : "",
-                        links.links, number(links.best_overlap), number(links.residual_mm), number(error.position_mm),
+                        csv_field(scan.path), io::name_of(scan.status), scan.reason_code, csv_field(scan.reason),
+                        scan.points, scan.segment_points, number(scan.noise_sigma), number(scan.score),
+                        number(scan.visible_share), number(scan.normal_agreement),
+                        scan.component ? fmt::format("{}", *scan.component) : "", links.links,
+                        number(links.best_overlap), number(links.residual_mm), number(error.position_mm),
                         number(error.rotation_deg), spots_of(input.deviations, i), scan.sha256);
   }
   return text;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program of a stranger's: it prepares a block, writes it, reads it back and inspects a cloud against it.
-#include <array>
-#include <cmath>
-#include <cstdio>
-
 #include <asbuilt/core/context.h>
 #include <asbuilt/core/triangle_mesh.h>
 #include <asbuilt/inspect/deviation.h>
 #include <asbuilt/io/mesh_file.h>
 #include <asbuilt/model/prepared_model.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
 
 namespace {
 

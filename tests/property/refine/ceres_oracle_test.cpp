@@ -74,8 +74,7 @@ Problem with_fixed_matches(const test::Scene& scene, double loss_scale) {
   problem.links = scene.links;
   const Context context(2);
   for (const View& view : scene.views) {
-    problem.views.push_back(
-        sampled_view(view.segment_in_scan, 0.0, {.points = 600, .coarse_points = 600}, context));
+    problem.views.push_back(sampled_view(view.segment_in_scan, 0.0, {.points = 600, .coarse_points = 600}, context));
     problem.poses.push_back(view.model_from_scan);
   }
   for (const Link& link : scene.links) {
