@@ -118,6 +118,12 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
   if (std::isnan(best.overrun_share)) return text;
   text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
                       percent_allowed(record, "max_overrun_share"));
+  const auto most_overrun = option_of(record, "max_overrun_share");
+  const auto most_denied = option_of(record, "max_contradiction_share");
+  if (!most_overrun || !most_denied || !(*most_overrun > 0.0) || !(*most_denied > 0.0)) return text;
+  text += fmt::format("  Together: contradictions and edges, each as a share of what is allowed, come to {:.2f}{}.\n",
+                      best.contradiction_share / *most_denied + best.overrun_share / *most_overrun,
+                      limit(record, "max_joint_denial", "allowed:", 1.0, ""));
   return text;
 }
 

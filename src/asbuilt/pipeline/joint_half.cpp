@@ -73,6 +73,7 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
     // Rough starts leave a graph with gaps, in which a scan may have gone astray that a better one brings back.
     if (contradiction && round > 1) {
       drop(scans, *contradiction, record, context);
+      restore_seen_through(scans);
       for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
       ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
       registration.graph = std::move(graph);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "asbuilt/pipeline/segment_file.h"
 #include "asbuilt/refine/gauge.h"
@@ -132,9 +133,18 @@ Result<void> remove_seen_through(const RefinedComponent& component, std::vector<
       kept.positions.push_back(part.positions[i]);
       kept.normals.push_back(part.normals[i]);
     }
-    if (!kept.empty()) part = std::move(kept);
+    if (kept.empty() || kept.size() == part.size()) continue;
+    PointCloud& whole = scans[static_cast<std::size_t>(component.members[v])].whole_part;
+    if (whole.empty()) whole = std::move(part);
+    part = std::move(kept);
   }
   return {};
+}
+
+void restore_seen_through(std::vector<PosedScan>& scans) {
+  for (PosedScan& scan : scans) {
+    if (!scan.whole_part.empty()) scan.part = std::exchange(scan.whole_part, {});
+  }
 }
 
 Result<std::optional<Contradiction>> contradiction_in(const RefinedComponent& component,

@@ -24,6 +24,7 @@ namespace asbuilt::pipeline {
 struct PosedScan {
   int index = 0;                                      ///< in the record
   PointCloud part;                                    ///< in the scan frame minus the offset
+  PointCloud whole_part;  ///< as read, where remove_seen_through has taken points out of `part`; else empty
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
@@ -66,6 +67,9 @@ struct Contradiction {
 /// measured: clutter that was cut out with the part, flying points.
 [[nodiscard]] Result<void> remove_seen_through(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                                const Context& context);
+
+/// Undoes remove_seen_through: what only a scan saw through that has turned out to stand wrong is the part's again.
+void restore_seen_through(std::vector<PosedScan>& scans);
 
 /// The scan, if there is one, that the others of its component contradict: they saw through its points, or it through
 /// theirs, or its residuals are much wider than theirs.

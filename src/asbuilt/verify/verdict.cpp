@@ -98,11 +98,10 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                     "to something larger",
                     100.0 * c.overrun_share, 100.0 * options.max_overrun_share)};
   }
-  // Each share within its limit, but both near it: right poses reach at most 1.2 together.
-  constexpr double kMostTogether = 1.5;
+  // Each share within its limit, but both near it.
   if (!options.paper_mode &&
       c.contradiction_share * options.max_overrun_share + c.overrun_share * options.max_contradiction_share >
-          kMostTogether * options.max_overrun_share * options.max_contradiction_share) {
+          options.max_joint_denial * options.max_overrun_share * options.max_contradiction_share) {
     return {Reason::contradicted,
             fmt::format("the scan denies {:.1f} % of the claimed surface, and the surface goes on past {:.0f} % of the "
                         "part's edges: each is allowed, but not both",

@@ -207,7 +207,9 @@ class Judge::Verification {
     std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
     near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
     candidates.insert(candidates.end(), near.begin(), near.end());
-    return best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+    candidates = best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+    put_refuted_last(level, candidates);
+    return candidates;
   }
 
   // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
@@ -423,6 +425,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("near_equal_ratio", near_equal_ratio, 0.0, 0.1));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_joint_denial", max_joint_denial, 0.0, 2.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }

@@ -35,6 +35,8 @@ struct VerifyOptions {
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
   double near_equal_ratio = 0.01;  ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
   double max_overrun_share = 0.2;  ///< of the edges past which the scan's surface may go on
+  double max_joint_denial =
+      1.5;  ///< contradictions and overrun, each as a share of its limit, together: right poses reach at most 1.2
   double max_normal_angle_deg = 30.0;  ///< normals closer than this agree
   bool paper_mode = false;
 
@@ -77,6 +79,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("near_equal_ratio", options.near_equal_ratio,
         "distance / diameter within which the surfaces of two poses need not be told apart");
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
+  field("max_joint_denial", options.max_joint_denial,
+        "sum of contradictions and overrun, each as a share of its limit");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
