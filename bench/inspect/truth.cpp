@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "truth.h"
 
+#include <cmath>
+#include <numbers>
+
+#include "asbuilt/simulate/scanner.h"
+
 namespace asbuilt::bench {
 namespace {
 
-constexpr double kCosLimit = 0.2419;  // 76 degrees
+// Beyond the angle at which the virtual scanner gets no returns at all a place cannot be scanned.
+const double kCosLimit = std::cos(simulate::NoiseModel{}.grazing_deg * std::numbers::pi / 180.0);
 
 }  // namespace
 

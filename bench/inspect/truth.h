@@ -16,8 +16,8 @@ class InspectionTruth {
  public:
   explicit InspectionTruth(const simulate::Simulation& simulation);
 
-  /// Whether any scan saw the place: it faces the sensor by less than 76 degrees (between where returns begin to fade
-  /// and where none come) and nothing of the part stands between.
+  /// Whether any scan could see the place: it faces the sensor by less than the angle at which the last returns fade
+  /// (NoiseModel::grazing_deg) and nothing of the part stands between.
   [[nodiscard]] bool is_visible(const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
 
   /// Distance of the true surface from a place of the CAD, positive outside; nothing beyond 2 % of the diameter.
