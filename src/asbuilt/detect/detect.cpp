@@ -68,9 +68,16 @@ HypothesisSearch::HypothesisSearch(const scan::Scan& scan, const SampledScan& sa
       scene_(detection_scene(scan, sampled, options)),
       order_(drawn_order(scene_.samples.size())) {}
 
-Result<void> HypothesisSearch::vote(int wanted, const Context& context) {
+Result<void> HypothesisSearch::vote(int wanted, const Context& context, double most_votes) {
+  constexpr std::size_t kStep = 500;  // from the scan alone, whatever the number of threads
   const std::size_t last = std::min(static_cast<std::size_t>(wanted), order_.size());
-  if (last <= voted_) return {};
+  while (voted_ < last && static_cast<double>(votes_cast_) < most_votes) {
+    ASBUILT_CHECK(vote_until(std::min(last, (voted_ / kStep + 1) * kStep), context));
+  }
+  return {};
+}
+
+Result<void> HypothesisSearch::vote_until(std::size_t last, const Context& context) {
   // Without a known sign both sides of the reference are tried.
   const std::size_t signs = scene_.normals_oriented ? 1 : 2;
   std::vector<std::vector<Hypothesis>> found((last - voted_) * signs);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "asbuilt/core/context.h"
@@ -31,15 +32,22 @@ class HypothesisSearch {
   HypothesisSearch(const scan::Scan& scan, const SampledScan& sampled, const Codebook& codebook,
                    const DetectOptions& options);
 
-  /// Lets further reference points vote, until `wanted` have or there are no more. Errors: cancelled.
-  [[nodiscard]] Result<void> vote(int wanted, const Context& context);
+  /// Lets further reference points vote, until `wanted` have, or there are no more, or at least `most_votes` have been
+  /// cast, which is asked after every 500 points. Errors: cancelled.
+  [[nodiscard]] Result<void> vote(int wanted, const Context& context,
+                                  double most_votes = std::numeric_limits<double>::infinity());
 
   /// The at most `most` strongest clusters of what has been voted for, by decreasing votes.
   [[nodiscard]] std::vector<Hypothesis> hypotheses(int most, const Context& context) const;
 
   [[nodiscard]] std::uint64_t votes_cast() const { return votes_cast_; }
 
+  /// So many reference points there are in the scan.
+  [[nodiscard]] std::size_t most_reference_points() const { return order_.size(); }
+
  private:
+  [[nodiscard]] Result<void> vote_until(std::size_t last, const Context& context);
+
   const Codebook& codebook_;
   DetectOptions options_;
   Scene scene_;

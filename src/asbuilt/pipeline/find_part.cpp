@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/pipeline/find_part.h"
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -10,6 +12,8 @@
 
 namespace asbuilt::pipeline {
 namespace {
+
+constexpr double kAnyVotes = std::numeric_limits<double>::infinity();
 
 std::vector<detect::Hypothesis> with_starts(const std::vector<Pose>& starts, std::vector<detect::Hypothesis> proposed) {
   const double votes = proposed.empty() ? 1.0 : proposed.front().votes;
@@ -40,10 +44,10 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     search.emplace(scan, sampled, codebook, options.detect);
   });
   FoundPart found;
-  const auto propose = [&](int reference_points, int most_hypotheses) {
+  const auto propose = [&](int reference_points, double most_votes, int most_hypotheses) {
     Result<void> voted;
     timed("detect", [&] {
-      voted = search->vote(reference_points, context);
+      voted = search->vote(reference_points, context, most_votes);
       if (voted) found.hypotheses = with_starts(starts, search->hypotheses(most_hypotheses, context));
     });
     found.votes_cast = search->votes_cast();
@@ -53,7 +57,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
   const int first = options.detect.first_reference_points, all = options.detect.reference_points;
 
   if (options.instances == Instances::all) {
-    ASBUILT_CHECK(propose(all, options.detect.max_hypotheses));
+    ASBUILT_CHECK(propose(all, kAnyVotes, options.detect.max_hypotheses));
     Result<std::vector<verify::Detection>> placements;
     timed("verify", [&] {
       placements = verify::verify_instances(scan, model, found.hypotheses, options.verify, context, &sampled);
@@ -72,14 +76,23 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     });
   };
   if (first > 0 && first < all) {
-    ASBUILT_CHECK(propose(first, options.detect.first_hypotheses));
+    ASBUILT_CHECK(propose(first, kAnyVotes, options.detect.first_hypotheses));
     judge_all(verify::Look::quick);
     if (!detection) return tl::unexpected(detection.error());
   }
   if (found.looks == 0 || !verify::is_beyond_doubt(*detection, options.verify)) {
-    ASBUILT_CHECK(propose(all, options.detect.max_hypotheses));
+    ASBUILT_CHECK(propose(all, kAnyVotes, options.detect.max_hypotheses));
     if (found.looks > 1) add_candidates(*detection, found.hypotheses);
     judge_all(verify::Look::thorough);
+    if (!detection) return tl::unexpected(detection.error());
+  }
+  // In a hall, hardly any of the reference points so far need lie on the part.
+  const int last = std::min(options.detect.last_reference_points, static_cast<int>(search->most_reference_points()));
+  const bool may_go_on = static_cast<double>(search->votes_cast()) < options.detect.most_votes;
+  if (detection->status == verify::Status::rejected && last > all && may_go_on) {
+    ASBUILT_CHECK(propose(last, options.detect.most_votes, options.detect.last_hypotheses));
+    add_candidates(*detection, found.hypotheses);
+    judge_all(verify::Look::patient);
     if (!detection) return tl::unexpected(detection.error());
   }
   found.placements.push_back(std::move(*detection));

@@ -10,6 +10,30 @@ namespace {
 
 constexpr double kClearlyNearer = 0.5;  // of the distance that counts as on the model
 
+// Rules out, without a look at the distance field, most of what cosine_if_seen() would.
+class TurnedToSensor {
+ public:
+  TurnedToSensor(const scan::Viewpoint& viewpoint, const Pose& model_from_scan, bool two_sided)
+      : kind_(viewpoint.kind), two_sided_(two_sided) {
+    if (kind_ == scan::Viewpoint::Kind::point) place_ = (model_from_scan * viewpoint.value).cast<float>();
+    if (kind_ == scan::Viewpoint::Kind::direction) place_ = -(model_from_scan.linear() * viewpoint.value).cast<float>();
+  }
+
+  bool operator()(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
+    constexpr float kRounding = 0.99F;
+    constexpr auto kLeast = kRounding * static_cast<float>(kGrazing);
+    if (kind_ == scan::Viewpoint::Kind::none) return true;
+    const Eigen::Vector3f towards = kind_ == scan::Viewpoint::Kind::point ? Eigen::Vector3f(place_ - point) : place_;
+    const float along = normal.dot(towards);
+    return (two_sided_ || along > 0.0F) && along * along >= kLeast * kLeast * towards.squaredNorm();
+  }
+
+ private:
+  scan::Viewpoint::Kind kind_;
+  bool two_sided_;
+  Eigen::Vector3f place_ = Eigen::Vector3f::Zero();  // of the sensor in the model frame, or the direction towards it
+};
+
 class Contrast {
  public:
   Contrast(const model::PreparedModel& model, const ScanEvidence& scan, const EvidenceOptions& options)
@@ -22,6 +46,7 @@ class Contrast {
     weight_ = measurements_per_sample(model, scan.scan);
     asked_ = std::clamp(static_cast<std::size_t>(kSamplesPerMeasurement * weight_ * static_cast<double>(all)),
                         std::min(kFewest, all), all);
+    asked_ = std::min(asked_, options.most_samples);
     weight_ = std::min(1.0, weight_ * static_cast<double>(all) / static_cast<double>(asked_));
   }
 
@@ -30,7 +55,9 @@ class Contrast {
     const Pose scan_from_own = own_from_scan.inverse();
     const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
     const PointCloud& samples = model_.dense_samples;
+    const TurnedToSensor is_turned(scan_.scan.viewpoint, own_from_scan, model_.is_open());
     for (std::size_t i = 0; i < asked_; ++i) {
+      if (!is_turned(samples.positions[i], samples.normals[i])) continue;
       const double apart = distance_at(other_from_own * samples.positions[i]);
       if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();

@@ -22,7 +22,7 @@ struct PoseContrast {
 ///
 /// Such a sample speaks for its pose if the nearest scan point lies on the model at this pose and clearly less so at
 /// the other; against it, if the sensor measured something else there. What is hidden or averted is not asked.
-/// Symmetric in the two poses. Cost: two lookups a sample, and a search and a ray for those that differ.
+/// Symmetric in the two poses. At most `most_samples` of the options are asked. Cost: two lookups a sample, and a search and a ray for those that differ.
 [[nodiscard]] PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan,
                                     const model::PreparedModel& model, const ScanEvidence& scan,
                                     const EvidenceOptions& options);

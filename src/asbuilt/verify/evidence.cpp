@@ -13,6 +13,10 @@ namespace {
 
 using Evidence = scan::DepthImage::Evidence;
 
+// What returned nothing lies together: behind something too near to be measured, on a dark or shining face. It is one
+// witness against a pose, not as many as there are samples, so each counts no more than this.
+constexpr double kMissing = 0.25;
+
 double ratio(double part, double whole) { return whole > 0.0 ? part / whole : 0.0; }
 
 scan::Scan without(const scan::Scan& scan, const std::vector<std::uint8_t>& background) {
@@ -103,7 +107,7 @@ class Judge {
           sum.seen_through += cosine;
           break;
         case Evidence::unknown:
-          sum.missing += cosine;
+          (scan_.field->is_outside(point) ? sum.hidden : sum.missing) += cosine;
           break;
       }
     }
@@ -165,7 +169,9 @@ ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::ui
       background(the_background),
       foreground(without(the_scan, the_background)),
       foreground_tree(foreground.cloud.positions) {
-  if (scan.viewpoint.known()) depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
+  if (!scan.viewpoint.known()) return;
+  depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
+  field.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
 }
 
 std::optional<double> cosine_if_seen(const Pose& scan_from_model, const Eigen::Vector3f& point_in_model,
@@ -185,7 +191,7 @@ std::optional<double> cosine_if_seen(const Pose& scan_from_model, const Eigen::V
 
 double PoseEvidence::score() const {
   return ratio(static_cast<double>(explained),
-               static_cast<double>(explained + contradicted + seen_through) + 0.5 * static_cast<double>(missing));
+               static_cast<double>(explained + contradicted + seen_through) + kMissing * static_cast<double>(missing));
 }
 
 double PoseEvidence::weakest_direction() const {
@@ -195,7 +201,7 @@ double PoseEvidence::weakest_direction() const {
 }
 
 double PoseEvidence::support(double contradiction_weight) const {
-  return ratio(explained - contradiction_weight * (contradicted + seen_through) - 0.25 * missing,
+  return ratio(explained - contradiction_weight * (contradicted + seen_through) - kMissing * missing,
                static_cast<double>(samples));
 }
 

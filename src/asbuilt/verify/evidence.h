@@ -12,6 +12,7 @@
 #include "asbuilt/core/pose.h"
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/scan/depth_image.h"
+#include "asbuilt/scan/field_of_view.h"
 #include "asbuilt/scan/scan.h"
 
 namespace asbuilt::verify {
@@ -27,6 +28,7 @@ struct ScanEvidence {
   scan::Scan foreground;                 ///< the scan without them: points, normals, surface variation
   KdTree foreground_tree;
   std::optional<scan::DepthImage> depth;  ///< of all points, if the viewpoint is known
+  std::optional<scan::FieldOfView> field;  ///< likewise
 };
 
 /// Surfaces seen flatter than this cosine of the incidence (78 degrees) return too little to be asked for.
@@ -49,7 +51,7 @@ struct PoseEvidence {
   std::size_t facing_samples = 0;      ///< those that ought to be visible, or would be but for other things
   double facing = 0.0;                 ///< turned to the sensor and not behind the part itself
   double explained = 0.0;              ///< the scan has a surface there (Eq. 11's condition, across the surface)
-  double hidden = 0.0;                 ///< something stands in front: neutral
+  double hidden = 0.0;                 ///< something stands in front, or nobody looked there: neutral
   double contradicted = 0.0;           ///< the scan has a surface nearby, but not there
   double seen_through = 0.0;           ///< the sensor measured something behind
   double missing = 0.0;                ///< no return: weak evidence against
@@ -63,7 +65,7 @@ struct PoseEvidence {
   /// For minus against: what candidates compete by, per sample asked.
   [[nodiscard]] double support(double contradiction_weight) const;
 
-  /// Xi over what should be visible and is not hidden; a missing return counts half.
+  /// Xi over what should be visible and is not hidden; a missing return counts a quarter.
   [[nodiscard]] double score() const;
   [[nodiscard]] double free_space_share() const;  ///< seen_through / (facing - hidden)
   [[nodiscard]] double visible_share() const;     ///< Eq. 11 over all samples

@@ -63,7 +63,8 @@ RimEvidence rim_evidence(const Pose& model_from_scan, std::span<const RimProbe> 
     if (!has_plane(on_face, normal, lateral, options.distance_mm, scan)) continue;
     const bool goes_on = has_plane(beyond, normal, lateral, options.distance_mm, scan);
     if (!goes_on && scan.depth &&
-        scan.depth->evidence(beyond, options.distance_mm) == scan::DepthImage::Evidence::hidden) {
+        (scan.depth->evidence(beyond, options.distance_mm) == scan::DepthImage::Evidence::hidden ||
+         scan.field->is_outside(beyond))) {
       continue;
     }
     ++evidence.asked;

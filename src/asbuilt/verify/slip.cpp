@@ -4,7 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/lm_icp.h"
@@ -79,14 +78,17 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
   constexpr double kFine = 0.01;                             // where valleys across the directions matter
   constexpr int kMostMoves = 4;                              // of each
   constexpr double kLeastGain = 2.0;                         // measurements
+  constexpr std::size_t kFewSamples = 2000;                  // show where to go
   Pose settled = model_from_scan;
+  EvidenceOptions few = options;
+  few.most_samples = std::min(few.most_samples, kFewSamples);
   for (const double step : kSteps) {
     for (int move = 0; move < kMostMoves; ++move) {
       const Pose here = settled;
       double most = kLeastGain;
       const Slips kinds = step > kFine ? Slips::single : Slips::combined;
       for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter, kinds)) {
-        const PoseContrast seen = contrast(here, slipped, model, scan, options);
+        const PoseContrast seen = contrast(here, slipped, model, scan, step > kFine ? few : options);
         if (seen.for_second - seen.for_first <= most) continue;
         most = seen.for_second - seen.for_first;
         settled = slipped;
@@ -97,15 +99,15 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
   return settled;
 }
 
-double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
-                             const model::PreparedModel& model, double min_held, double slip_mm,
-                             const ScanEvidence& scan, const EvidenceOptions& options) {
-  double least = std::numeric_limits<double>::infinity();
+Slip strongest_slip(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
+                    double min_held, double slip_mm, const ScanEvidence& scan, const EvidenceOptions& options) {
+  Slip strongest;
   for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, min_held, slip_mm, Slips::combined)) {
     const PoseContrast seen = contrast(model_from_scan, slipped, model, scan, options);
-    least = std::min(least, seen.for_first - seen.for_second);
+    const double lead = seen.for_first - seen.for_second;
+    if (lead < strongest.lead_over_it) strongest = {slipped, lead};
   }
-  return std::isfinite(least) ? least : 0.0;
+  return strongest;
 }
 
 }  // namespace asbuilt::verify

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "asbuilt/core/pose.h"
@@ -30,10 +31,17 @@ enum class Slips { single, combined };
                                          const model::PreparedModel& model, double min_held, const ScanEvidence& scan,
                                          const EvidenceOptions& options);
 
-/// By how many measurements a pose leads over the slipped pose that comes closest to it (see contrast()). Sees what
-/// eigenvalues do not: that the sensor looked past the edge at which the part ends. Negative if a slip would be better.
-[[nodiscard]] double least_lead_over_slips(const Pose& model_from_scan, const PoseEvidence& evidence,
-                                           const model::PreparedModel& model, double min_held, double slip_mm,
-                                           const ScanEvidence& scan, const EvidenceOptions& options);
+/// A pose into which the part may have slipped, and by how many measurements another leads over it (see contrast());
+/// negative if this one explains the scan better, infinite if there is none.
+struct Slip {
+  Pose model_from_scan = Pose::Identity();
+  double lead_over_it = std::numeric_limits<double>::infinity();
+};
+
+/// The slipped pose that comes closest to a pose. Sees what eigenvalues do not: that the sensor looked past the edge at
+/// which the part ends.
+[[nodiscard]] Slip strongest_slip(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                  const model::PreparedModel& model, double min_held, double slip_mm,
+                                  const ScanEvidence& scan, const EvidenceOptions& options);
 
 }  // namespace asbuilt::verify

@@ -30,6 +30,9 @@ constexpr double kContradictionWeight = 3.0;
 
 // Of the diameter. A pose that could be displaced so far unnoticed is not known.
 constexpr double kSlips[] = {0.03, 0.1};
+// Where other things feign the part's edges, the right pose may be further along.
+constexpr double kFarSlips[] = {0.06, 0.12, 0.18, 0.24};
+constexpr double kSamePlace = 0.03;  // a slip that registration takes back so far is none
 
 // Edges are read to within so many times the scatter of the points on the model, but to no less than a share of the
 // distance that counts as on it.
@@ -37,8 +40,9 @@ constexpr double kEdgeScatter = 4.0, kFinestEdge = 0.3;
 
 // Of the diameter: how far past its edges the part's surface must not go on.
 constexpr double kRimReach = 0.03;
-constexpr std::size_t kMostRimSamples = 3000;
+constexpr std::size_t kMostRimSamples = 3000, kFewRimProbes = 200, kSomeRimProbes = 600;
 
+constexpr double kLittle = 0.3;      // of the largest support
 constexpr double kClearly = 2.0;     // times the contradictions allowed: such a pose is wrong, even if not yet precise
 constexpr double kPlausible = 0.75;  // of the score that is needed: where it pays to look for a better place
 
@@ -54,7 +58,8 @@ struct Level {
   std::size_t survivors;     ///< candidates that reach the next level
   const PointCloud* model_samples;
   double contradiction_weight;  ///< a right pose has few contradictions, once it is precise
-  bool asks_rims;               ///< whether the surface goes on past the part's edges counts
+  std::size_t most_rim_probes;  ///< at the part's edges, where its surface must not go on
+  bool is_precise;              ///< poses are, so that contradictions refute
 };
 
 double score_distance(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options) {
@@ -81,20 +86,38 @@ std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<
 // A quick look carries fewer candidates along: what it does not settle is looked at again.
 std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance, Look look) {
   const double d = model.sampling_distance;
-  const bool is_quick = look == Look::quick;
-  const std::size_t first = is_quick ? 16 : 40, second = is_quick ? 8 : 16, third = is_quick ? 4 : 8;
-  return {
-      {{0.8 * d, {2.0 * d, d}, std::max(0.5 * d, final_distance), 500, 500, first, &model.samples, 1.0, false},
-       {0.5 * d, {0.7 * d, 0.4 * d}, std::max(0.25 * d, final_distance), 1000, 1000, second, &model.samples, 2.0, true},
-       {0.3 * d,
-        {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-        final_distance,
-        3000,
-        3000,
-        third,
-        &model.dense_samples,
-        kContradictionWeight,
-        true}}};
+  const std::size_t third = look == Look::quick ? 4 : look == Look::thorough ? 8 : 16;
+  const std::size_t second = 2 * third, first = look == Look::quick ? 16 : 5 * third;
+  return {{{0.8 * d,
+            {2.0 * d, d},
+            std::max(0.5 * d, final_distance),
+            500,
+            500,
+            first,
+            &model.samples,
+            1.0,
+            kFewRimProbes,
+            false},
+           {0.5 * d,
+            {0.7 * d, 0.4 * d},
+            std::max(0.25 * d, final_distance),
+            1000,
+            1000,
+            second,
+            &model.samples,
+            2.0,
+            kSomeRimProbes,
+            true},
+           {0.3 * d,
+            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+            final_distance,
+            3000,
+            3000,
+            third,
+            &model.dense_samples,
+            kContradictionWeight,
+            kSomeRimProbes,
+            true}}};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -207,7 +230,8 @@ class Judge::Verification {
     std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
     near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
     candidates.insert(candidates.end(), near.begin(), near.end());
-    candidates = best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+    candidates =
+        best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
     put_refuted_last(level, candidates);
     return candidates;
   }
@@ -257,40 +281,42 @@ class Judge::Verification {
       return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
     };
     PoseEvidence evidence = judged_densely();
-    const bool is_plausible = candidate.score >= kPlausible * options_.acceptance_score &&
-                              candidate.contradiction_share <= kClearly * options_.max_contradiction_share;
-    if (is_plausible && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
+    const auto is_plausible = [&] {
+      return candidate.score >= kPlausible * options_.acceptance_score &&
+             candidate.contradiction_share <= kClearly * options_.max_contradiction_share;
+    };
+    if (is_plausible() && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
       register_at(final_distance_, kManyIterations, kMostPoints);
       evidence = judged_densely();
     }
     const auto is_loose = [&] {
-      return !options_.paper_mode && is_plausible && candidate.weakest_direction < options_.min_weakest_direction;
+      return !options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction;
     };
     // What edges show is read as finely as this part fits, not as deviating parts may.
     const double edge_distance =
         std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance_, final_distance_);
     const EvidenceOptions edge_options{edge_distance, lateral(edge_distance)};
-    if (is_loose()) {
-      const Pose settled = settled_between_edges(candidate.model_from_scan, evidence, model_,
-                                                 options_.min_weakest_direction, evidence_, edge_options);
-      if (settled.matrix() != candidate.model_from_scan.matrix()) {
-        candidate.model_from_scan = settled;
-        evidence = judged_densely();
-      }
+    const auto settled = [&](const Pose& pose) {
+      return settled_between_edges(pose, evidence, model_, options_.min_weakest_direction, evidence_, edge_options);
+    };
+    if (is_loose() && may_have_drifted(candidate)) {
+      const Pose drifted = candidate.model_from_scan;
+      candidate.model_from_scan = settled(drifted);
+      if (candidate.model_from_scan.matrix() != drifted.matrix()) evidence = judged_densely();
     }
     candidate.without_rays = !options_.paper_mode && !scan_.viewpoint.known();
     if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
-    candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
-    if (is_loose()) {
+    constexpr int kMostMoves = 2;
+    for (int move = 0; is_loose() && is_plausible(); ++move) {
       candidate.loose_directions = loose_directions(evidence, model_, options_.min_weakest_direction);
-      candidate.slip_lead = std::numeric_limits<double>::infinity();
-      for (const double slip : kSlips) {
-        candidate.slip_lead =
-            std::min(candidate.slip_lead,
-                     least_lead_over_slips(candidate.model_from_scan, evidence, model_, options_.min_weakest_direction,
-                                           slip * model_.diameter, evidence_, edge_options));
-      }
+      const Slip rival = strongest_rival(candidate.model_from_scan, evidence, around, edge_options);
+      candidate.slip_lead = std::isfinite(rival.lead_over_it) ? rival.lead_over_it : 0.0;
+      if (candidate.slip_lead >= 0.0 || move == kMostMoves) break;
+      candidate.model_from_scan = settled(rival.model_from_scan);
+      evidence = judged_densely();
+      if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     }
+    candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     judge_normals(candidate);
@@ -304,6 +330,55 @@ class Judge::Verification {
   }
 
  private:
+  // Of the poses into which the part may have slipped that which comes closest, or one that explains the scan better.
+  [[nodiscard]] Slip strongest_rival(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                     std::span<const Eigen::Vector3f> points_in_scan,
+                                     const EvidenceOptions& edge_options) const {
+    Slip strongest;
+    const auto consider = [&](const Slip& slip) {
+      if (slip.lead_over_it < strongest.lead_over_it) strongest = slip;
+    };
+    for (const double slip : kSlips) {
+      consider(strongest_slip(model_from_scan, evidence, model_, options_.min_weakest_direction, slip * model_.diameter,
+                              evidence_, edge_options));
+    }
+    if (strongest.lead_over_it > 0.0 && std::isfinite(strongest.lead_over_it)) {
+      consider(strongest_far_slip(model_from_scan, evidence, points_in_scan, edge_options));
+    }
+    return strongest;
+  }
+
+  // The same over poses further along the loose directions, each brought onto the surface again.
+  [[nodiscard]] Slip strongest_far_slip(const Pose& model_from_scan, const PoseEvidence& evidence,
+                                        std::span<const Eigen::Vector3f> points_in_scan,
+                                        const EvidenceOptions& edge_options) const {
+    constexpr std::size_t kMostPoints = 2000;
+    constexpr int kMostIterations = 20;
+    const auto points = points_in_scan.first(std::min(kMostPoints, points_in_scan.size()));
+    Slip strongest;
+    for (const double slip : kFarSlips) {
+      for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model_, options_.min_weakest_direction,
+                                               slip * model_.diameter, Slips::single)) {
+        const Pose there =
+            lm_icp(points, slipped, model_, scan_.viewpoint, {1.5 * final_distance_, kMostIterations, only_facing()})
+                .model_from_scan;
+        if (displacement_modulo_mm(model_from_scan, there, model_) <= kSamePlace * model_.diameter) continue;
+        const PoseContrast seen = contrast(model_from_scan, there, model_, evidence_, edge_options);
+        const double lead = seen.for_first - seen.for_second;
+        if (lead < strongest.lead_over_it) strongest = {there, lead};
+      }
+    }
+    return strongest;
+  }
+
+  // Registration drifts along loose directions, by what it takes for the part's side walls among other things. What it
+  // drifted into then denies the pose, so much may do that.
+  [[nodiscard]] bool may_have_drifted(const Candidate& candidate) const {
+    constexpr double kMostDenied = 0.35;
+    return candidate.score >= 0.5 * options_.acceptance_score && candidate.contradiction_share <= kMostDenied &&
+           candidate.overrun_share <= kClearly * options_.max_overrun_share;
+  }
+
   // Most places go to the best by support, those that lie on something larger than the part or are clearly denied
   // behind all others; the rest go to those with most votes: small views have little support, but may have many votes.
   [[nodiscard]] std::vector<Candidate> survivors_of(const Level& level, std::vector<Candidate> candidates) const {
@@ -311,7 +386,7 @@ class Judge::Verification {
     const double apart = kSamePose * model_.diameter;
     if (options_.paper_mode) return best_different(std::move(candidates), level.survivors, apart, model_, options_);
     candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
-    if (level.asks_rims) put_refuted_last(level, candidates);
+    put_refuted_last(level, candidates);
     if (candidates.size() <= level.survivors) return candidates;
     const auto by_support = static_cast<std::ptrdiff_t>(kShareBySupport * static_cast<double>(level.survivors));
     std::stable_sort(candidates.begin() + by_support, candidates.end(),
@@ -321,18 +396,23 @@ class Judge::Verification {
   }
 
   void put_refuted_last(const Level& level, std::vector<Candidate>& candidates) const {
-    constexpr std::size_t kMostProbes = 600;
-    const auto probes = std::span(rim_probes_).first(std::min(kMostProbes, rim_probes_.size()));
+    const auto probes = std::span(rim_probes_).first(std::min(level.most_rim_probes, rim_probes_.size()));
     const EvidenceOptions options{level.score_distance_mm, lateral(level.score_distance_mm)};
     parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
       Candidate& candidate = candidates[i];
       candidate.overrun_share =
           rim_evidence(candidate.model_from_scan, probes, rim_reach_, evidence_, options).overrun_share();
     });
-    std::ranges::stable_partition(candidates, [&](const Candidate& c) {
-      return c.overrun_share <= options_.max_overrun_share &&
-             c.contradiction_share <= kClearly * options_.max_contradiction_share;
-    });
+    double most_support = 0.0;
+    for (const Candidate& candidate : candidates) most_support = std::max(most_support, candidate.support);
+    const auto doubts = [&](const Candidate& c) {
+      if (c.overrun_share > options_.max_overrun_share) return 2;
+      if (!level.is_precise) return 0;
+      if (c.contradiction_share > kClearly * options_.max_contradiction_share) return 2;
+      const bool has_little = c.support < kLittle * most_support;
+      return has_little || c.contradiction_share > options_.max_contradiction_share ? 1 : 0;
+    };
+    std::ranges::stable_sort(candidates, std::ranges::less{}, doubts);
   }
 
   void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {

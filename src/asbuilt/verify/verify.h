@@ -84,8 +84,9 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
-/// How many candidates go through the pyramid: a quick look carries less than half of them.
-enum class Look { quick, thorough };
+/// How many candidates go through the pyramid: a quick look carries half as many as a thorough one, a patient look twice
+/// as many.
+enum class Look { quick, thorough, patient };
 
 /// Judges hypotheses about one scan: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part
 /// out. What the scan is asked by (trees, depth image, planes) is made once, for any number of questions.

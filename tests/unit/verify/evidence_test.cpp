@@ -69,7 +69,9 @@ TEST(Evidence, SeenThroughCountsAgainst) {
 
 TEST(Evidence, NoReturnIsWeakerThanSeenThrough) {
   const Pose pose = test::pose_at(kPlace);
-  const PoseEvidence nothing = judged(test::seen({test::plate_at({60, 60, 5}, {-120, 0, 800})}), pose);
+  // Two plates at opposite corners of the image, so that the camera looked at the part's place as well.
+  const PoseEvidence nothing = judged(
+      test::seen({test::plate_at({60, 60, 5}, {-160, -160, 800}), test::plate_at({60, 60, 5}, {160, 160, 800})}), pose);
   EXPECT_GT(nothing.missing, 0.95 * nothing.facing);
   const PoseEvidence through = judged(test::seen({wall()}), pose);
   EXPECT_GT(through.seen_through, 0.95 * through.facing);
@@ -77,6 +79,17 @@ TEST(Evidence, NoReturnIsWeakerThanSeenThrough) {
   half_missing.explained = half_seen_through.explained = 1.0;
   half_missing.missing = half_seen_through.seen_through = 1.0;
   EXPECT_GT(half_missing.score(), half_seen_through.score());
+}
+
+TEST(Evidence, WhereTheCameraDidNotLookIsNeutral) {
+  const Pose pose = test::pose_at(kPlace);
+  const std::vector<TriangleMesh> things{part_at(pose), wall()};
+  const PoseEvidence whole = judged(test::seen(things), pose);
+  const PoseEvidence close_up = judged(test::seen(things, 0.04, 0.0005), pose);  // cuts off most of the part
+  EXPECT_LT(close_up.explained, 0.6 * whole.explained);
+  EXPECT_GT(close_up.hidden, 0.4 * close_up.facing);
+  EXPECT_LT(close_up.missing, 0.05 * close_up.facing);
+  EXPECT_GT(close_up.score(), 0.97);
 }
 
 TEST(Evidence, ASurfaceElsewhereContradicts) {

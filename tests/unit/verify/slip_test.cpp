@@ -26,7 +26,10 @@ struct Asked {
     evidence = evidence_for(model_from_scan, model.dense_samples, model, *seen, options);
   }
   [[nodiscard]] double lead(double min_held = VerifyOptions().min_weakest_direction) const {
-    return least_lead_over_slips(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, *seen, options);
+    return slip(min_held).lead_over_it;
+  }
+  [[nodiscard]] Slip slip(double min_held) const {
+    return strongest_slip(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, *seen, options);
   }
   [[nodiscard]] double weakest() const { return weakest_direction(evidence, model, false); }
 
