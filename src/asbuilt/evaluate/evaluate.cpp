@@ -152,6 +152,7 @@ Result<void> judge_reconstruction(Evaluation& evaluation, const PartPoints& poin
                                   const Pose& ours, const Pose& truth, const TriangleMesh& as_built,
                                   const model::SurfaceDistance& surface, const Context& context) {
   ASBUILT_TRY(cloud, reconstruction_points(file, ours));
+  evaluation.reconstruction_distance_mm = mean_surface_distance(cloud, surface, context);
   if (evaluation.noise_sigma_mm > 0.0) {
     const double far_mm = kFarInSigmas * evaluation.noise_sigma_mm;
     const PointsBeyond beyond = points_beyond(cloud, far_mm, surface, context);

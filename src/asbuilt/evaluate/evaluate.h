@@ -54,6 +54,7 @@ struct Evaluation {
   std::optional<double> relative_pose_error_sigma;  ///< the same / noise sigma
 
   // Of reconstruction.ply, where there is one; after the motion under which mean_distance_mm is taken.
+  std::optional<double> reconstruction_distance_mm;  ///< mean distance of its points to the true as-built surface
   std::size_t reconstruction_points = 0;
   std::size_t reconstruction_beyond = 0;              ///< further than 6 sigma from the true as-built surface
   std::optional<double> reconstruction_beyond_share;  ///< of the points

@@ -58,9 +58,10 @@ std::string percent(const std::optional<double>& share, int digits) {
 
 std::string reconstruction_line(const Evaluation& evaluation) {
   if (!evaluation.reconstruction_beyond_share && !evaluation.reconstruction_completeness) return {};
-  return fmt::format("reconstruction: {} of {} points beyond 6 sigma of the true surface ({}; true points under true "
-                     "poses {}), completeness {}\n",
-                     evaluation.reconstruction_beyond, evaluation.reconstruction_points,
+  return fmt::format("reconstruction: {} mm from the true surface in the mean, {} of {} points beyond 6 sigma ({}; true "
+                     "points under true poses {}), completeness {}\n",
+                     figure(evaluation.reconstruction_distance_mm, 4), evaluation.reconstruction_beyond,
+                     evaluation.reconstruction_points,
                      percent(evaluation.reconstruction_beyond_share, 3), percent(evaluation.oracle_beyond_share, 3),
                      percent(evaluation.reconstruction_completeness, 2));
 }
@@ -85,6 +86,7 @@ std::string to_json(const Evaluation& evaluation) {
             {"ratio_to_oracle", value_or_null(evaluation.ratio_to_oracle)},
             {"relative_pose_error_mm", value_or_null(evaluation.relative_pose_error_mm)},
             {"relative_pose_error_sigma", value_or_null(evaluation.relative_pose_error_sigma)},
+            {"reconstruction_distance_mm", value_or_null(evaluation.reconstruction_distance_mm)},
             {"reconstruction_points", evaluation.reconstruction_points},
             {"reconstruction_beyond", evaluation.reconstruction_beyond},
             {"reconstruction_beyond_share", value_or_null(evaluation.reconstruction_beyond_share)},

@@ -13,6 +13,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/fuse/point_grid.h"
+#include "asbuilt/fuse/surface_normals.h"
 
 namespace asbuilt::fuse {
 namespace {
@@ -21,6 +22,8 @@ constexpr double kAbsorbInSpacings = 0.75;  // any point of a square lattice of 
 constexpr double kMergeInSpacings = 1.0;
 constexpr double kLayerInSigmas = 4.0;     // along the normal: two samples of one surface differ by no more
 constexpr double kLayerInSpacings = 0.25;  // ... plus what surface shape does within the merge distance
+constexpr double kMeanInSigmas = 3.0;     // of the difference of two samples: a mean is of one quantity
+constexpr double kMeanTilt = 0.05;        // radians by which normals may err
 constexpr double kIsolationInSpacings = 5.0;
 constexpr int kIsolatedGroup = 2;           // a point with at most one other near is isolated
 constexpr float kNormalMeanCosine = 0.94F;  // 20 degrees: normals that are averaged
@@ -64,7 +67,7 @@ Result<void> check(const PosedSegment& segment, std::size_t place) {
   return {};
 }
 
-Union union_of(std::span<const PosedSegment> segments, const Context& context) {
+Union union_of(std::span<const PosedSegment> segments, bool fit_faces, const Context& context) {
   std::vector<Scan> scans(segments.size());
   for (std::size_t s = 0; s < segments.size(); ++s) {
     const double measured =
@@ -79,6 +82,8 @@ Union union_of(std::span<const PosedSegment> segments, const Context& context) {
   Union all;
   for (const std::size_t s : order) {
     const PointCloud& from = segments[s].segment_in_scan;
+    const std::vector<Eigen::Vector3f> normals =
+        fit_faces ? surface_normals(from, scans[s].sigma, scans[s].spacing, context) : from.normals;
     const Pose& pose = segments[s].model_from_scan;
     const std::size_t start = all.cloud.size();
     all.starts.push_back(start);
@@ -87,7 +92,7 @@ Union union_of(std::span<const PosedSegment> segments, const Context& context) {
     all.scan_of.resize(start + from.size(), static_cast<std::uint16_t>(all.scans.size()));
     parallel_for(context, from.size(), 1 << 14, [&](std::size_t i) {
       all.cloud.positions[start + i] = (pose * from.positions[i].cast<double>()).cast<float>();
-      all.cloud.normals[start + i] = (pose.linear() * from.normals[i].cast<double>()).cast<float>();
+      all.cloud.normals[start + i] = (pose.linear() * normals[i].cast<double>()).cast<float>();
     });
     all.scans.push_back(scans[s]);
   }
@@ -153,6 +158,19 @@ std::vector<char> kept_samples(const Union& all, const PointGrid& grid, const Sa
   return kept;
 }
 
+// Samples that differ by no more than their noise explains. Others of the same surface count as having seen it, but
+// would pull the mean off it: the far side of a profile that is no wider than the samples are apart, an edge's other face.
+struct Averaging {
+  bool noise_is_known = false;
+
+  [[nodiscard]] bool holds(const Union& all, std::size_t a, std::size_t b) const {
+    if (!noise_is_known) return true;
+    const double noise = std::hypot(all.scans[all.scan_of[a]].sigma, all.scans[all.scan_of[b]].sigma);
+    const double apart = static_cast<double>((all.cloud.positions[b] - all.cloud.positions[a]).norm());
+    return std::abs(SameSurface::height(all.cloud, a, b)) <= kMeanInSigmas * noise + kMeanTilt * apart;
+  }
+};
+
 struct Fused {
   Eigen::Vector3f position, normal;
   std::uint16_t scan = 0, support = 0;
@@ -194,10 +212,12 @@ Fused fused_sample(std::size_t i, const Union& all, const PointGrid& grid, const
   double total = 0.0, height = 0.0;
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   const auto radius = static_cast<float>(same.radius);
+  const Averaging averaging{weights.known};
   grid.along(all.cloud.positions[i], all.cloud.normals[i], radius, [&](std::uint32_t j) {
     if (!same.holds(all.cloud, i, j)) return false;
     const double weight = weights.of_scan[all.scan_of[j]];
     scans.add(all.scan_of[j], weight);
+    if (!averaging.holds(all, i, j)) return false;
     total += weight;
     height += weight * SameSurface::height(all.cloud, i, j);
     if (all.cloud.normals[i].dot(all.cloud.normals[j]) > kNormalMeanCosine) {
@@ -263,7 +283,7 @@ Result<Reconstruction> fuse(std::span<const PosedSegment> segments, const FuseOp
                             const Context& context) {
   ASBUILT_CHECK(options.validate());
   for (std::size_t i = 0; i < segments.size(); ++i) ASBUILT_CHECK(check(segments[i], i));
-  const Union all = union_of(segments, context);
+  const Union all = union_of(segments, !options.paper_mode, context);
   if (all.cloud.empty()) return fail(ErrorCode::not_possible, "there are no points to fuse");
 
   const double spacing = typical_spacing(all);

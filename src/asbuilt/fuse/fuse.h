@@ -52,8 +52,9 @@ struct Reconstruction {
 ///
 /// The scan with the finest spacing keeps its samples; a sample of a coarser one is absorbed when it lies within 0.75
 /// of its own spacing of a sample that was kept and faces the same way. A kept sample moves along its normal only, to
-/// the mean of all samples around it, each weighted by 1 / sigma^2: where it stands on the surface stays as measured,
-/// so edges are not rounded, and the two sides of a thin wall, whose normals oppose, never meet.
+/// the mean of the samples around it that differ by no more than noise explains, each weighted by 1 / sigma^2: where it
+/// stands on the surface stays as measured, so edges are not rounded, and the two sides of a thin wall, whose normals
+/// oppose, never meet. Normals are fitted anew, to the points of one face each, where noise and spacing are known.
 ///
 /// Same bytes for any number of threads. Cost O(n log n). Errors: invalid_argument (options, normals missing, scan
 /// index out of [0, 65535], non-finite values), not_possible (no points at all), cancelled.
