@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,6 +13,8 @@
 
 namespace asbuilt::fuse {
 
+using Colour = std::array<std::uint8_t, 3>;  ///< red, green, blue
+
 /// One refined scan: its segment at full density, in the scan frame, with oriented normals.
 struct PosedSegment {
   PointCloud segment_in_scan;
@@ -19,6 +22,8 @@ struct PosedSegment {
   double noise_sigma_mm = 0.0;  ///< 0: unknown
   double spacing_mm = 0.0;      ///< 0: measured
   int scan_index = 0;           ///< index in result.json
+  std::vector<Colour> colours = {};     ///< as the sensor saw it; empty or one a point
+  std::vector<float> intensities = {};  ///< likewise
 };
 
 struct FuseOptions {
@@ -44,7 +49,11 @@ struct Reconstruction {
   std::vector<std::uint16_t> scan;     ///< the dominant scan of each point
   std::vector<std::uint16_t> support;  ///< number of scans that saw it
   std::vector<float> sigma_mm;         ///< standard error along the normal (of independent sensor noise; 0: unknown)
-  double merge_distance_mm = 0.0;      ///< as used
+  /// Means of the samples that were merged, by precision; one a point if any scan has them, else empty. Points of scans
+  /// without them are black, and have no intensity (NaN).
+  std::vector<Colour> colours;
+  std::vector<float> intensities;
+  double merge_distance_mm = 0.0;  ///< as used
   std::size_t isolated_dropped = 0;
 };
 

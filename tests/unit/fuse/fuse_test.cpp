@@ -175,6 +175,44 @@ TEST(Fuse, ACurvedSurfaceIsNotPulledInside) {
   for (const auto& point : result.cloud.positions) EXPECT_NEAR(point.norm(), 5.0F, 1e-3F);
 }
 
+TEST(Fuse, ColourAndIntensityAreMeansByPrecision) {
+  // The second scan is half as noisy, so it weighs four times as much; the third knows of neither.
+  std::vector<PosedSegment> segments{scan_of({0.0, 20.0}, 0.5, 0.04, 0, 9), scan_of({0.0, 20.0}, 0.5, 0.02, 1, 9),
+                                     scan_of({30.0, 50.0}, 0.5, 0.02, 2, 9)};
+  segments[0].colours.assign(segments[0].segment_in_scan.size(), {200, 0, 50});
+  segments[0].intensities.assign(segments[0].segment_in_scan.size(), 1.0F);
+  segments[1].colours.assign(segments[1].segment_in_scan.size(), {100, 0, 150});
+  segments[1].intensities.assign(segments[1].segment_in_scan.size(), 6.0F);
+  const Reconstruction result = fuse::fuse(segments, {}, Context(2)).value();
+  ASSERT_EQ(result.colours.size(), result.cloud.size());
+  ASSERT_EQ(result.intensities.size(), result.cloud.size());
+  double intensity = 0.0, red = 0.0, places = 0.0;
+  for (std::size_t i = 0; i < result.cloud.size(); ++i) {
+    const float x = result.cloud.positions[i].x();
+    if (x > 25.0F) {
+      EXPECT_EQ(result.colours[i], (Colour{0, 0, 0}));
+      EXPECT_TRUE(std::isnan(result.intensities[i]));
+      continue;
+    }
+    EXPECT_EQ(result.colours[i][1], 0);
+    if (x < 2.0F || x > 18.0F) continue;  // at the rims the numbers of samples of both differ
+    intensity += static_cast<double>(result.intensities[i]);
+    red += result.colours[i][0];
+    places += 1.0;
+  }
+  // Both have as many samples anywhere: (1 + 4 * 6) / 5 and (200 + 4 * 100) / 5.
+  EXPECT_NEAR(intensity / places, 5.0, 0.1);
+  EXPECT_NEAR(red / places, 120.0, 2.0);
+
+  FuseOptions union_only;
+  union_only.paper_mode = true;
+  const Reconstruction all = fuse::fuse(segments, union_only, Context(2)).value();
+  EXPECT_EQ(std::ranges::count(all.colours, Colour{200, 0, 50}),
+            static_cast<std::ptrdiff_t>(segments[0].segment_in_scan.size()));
+  segments[0].colours.pop_back();
+  EXPECT_EQ(fuse::fuse(segments, {}, Context(1)).error().code, ErrorCode::invalid_argument);
+}
+
 TEST(Fuse, OnlyClearlyIsolatedPointsAreLeftOut) {
   PosedSegment scan = scan_of({}, 0.5, 0.02, 0, 8);
   scan.segment_in_scan.positions.emplace_back(10.0F, 10.0F, 30.0F);  // flies 60 spacings above
