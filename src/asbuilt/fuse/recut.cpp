@@ -18,13 +18,13 @@ namespace {
 
 constexpr std::size_t kGrain = 1024;
 constexpr double kAroundInSpacings = 2.0;
-constexpr int kAgreeing = 2;             // one alone may fly, too
-constexpr double kAgreeInSigmas = 2.0;   // of the difference of two samples
-constexpr double kAgreeTilt = 0.03;      // radians by which normals may err
-constexpr float kFacingAlike = 0.7F;     // cosine, 45 degrees
-constexpr std::size_t kRays = 3;         // next to the line of sight
+constexpr int kConfirming = 2, kJoining = 3;  // one alone may fly, too; the scan itself took margin for margin
+constexpr double kAgreeInSigmas = 1.5;        // of the difference of two samples
+constexpr double kAgreeTilt = 0.03;           // radians by which normals may err
+constexpr float kFacingAlike = 0.7F;          // cosine, 45 degrees
+constexpr std::size_t kRays = 3;              // next to the line of sight
 constexpr double kNextRay = 1.5, kLastRay = 3.0;  // how near, in spacings: a hole in the scan is no view through
-constexpr double kThroughInSigmas = 3.0;
+constexpr double kThroughInSigmas = 2.5;
 constexpr double kThroughTilt = 0.05;
 constexpr double kGrazing = 0.1;  // cosine: a surface seen edge-on says nothing
 constexpr double kUnknownNoiseInSpacings = 0.1;
@@ -102,8 +102,11 @@ Result<void> check(const SeenSegment& segment, std::size_t place) {
 }
 
 Scale scale_of(const SeenSegment& segment) {
-  Scale scale{segment.noise_sigma_mm, segment.spacing_mm};
-  if (!(scale.spacing > 0.0)) scale.spacing = median_spacing(segment.cloud_in_scan.positions);
+  PointCloud part;
+  for (std::size_t i = 0; i < segment.is_part.size(); ++i) {
+    if (segment.is_part[i] != 0) part.positions.push_back(segment.cloud_in_scan.positions[i]);
+  }
+  Scale scale{segment.noise_sigma_mm, median_spacing(part.positions)};
   if (!(scale.sigma > 0.0)) scale.sigma = kUnknownNoiseInSpacings * scale.spacing;
   return scale;
 }
@@ -164,6 +167,7 @@ class Recut {
         (own.model_from_scan * own.cloud_in_scan.positions[point].cast<double>()).cast<float>();
     const Eigen::Vector3f normal =
         (own.model_from_scan.linear() * own.cloud_in_scan.normals[point].cast<double>()).cast<float>();
+    const int wanted = facing_alike ? kJoining : kConfirming;
     int agreeing = 0;
     grid_->around_until(position, [&](std::uint32_t j) {
       const std::size_t other = parts_.segment_of[j];
@@ -174,9 +178,9 @@ class Recut {
       const double tolerance =
           kAgreeInSigmas * std::hypot(scales_[segment].sigma, scales_[other].sigma) + kAgreeTilt * apart;
       agreeing += std::abs(static_cast<double>(parts_.cloud.normals[j].dot(offset))) <= tolerance ? 1 : 0;
-      return agreeing == kAgreeing;
+      return agreeing == wanted;
     });
-    return agreeing == kAgreeing;
+    return agreeing == wanted;
   }
 
   [[nodiscard]] bool seen_through(std::size_t segment, std::size_t point,

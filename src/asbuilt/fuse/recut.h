@@ -19,7 +19,6 @@ struct SeenSegment {
   std::vector<std::uint8_t> is_part;  ///< one a point, as cut out of this scan alone
   Pose model_from_scan = Pose::Identity();
   double noise_sigma_mm = 0.0;  ///< 0: unknown, a tenth of the spacing is assumed
-  double spacing_mm = 0.0;      ///< 0: measured
   scan::Viewpoint viewpoint;    ///< in the frame of `cloud_in_scan`
 };
 
@@ -30,7 +29,7 @@ struct SeenSegment {
 /// within noise. Another scan *saw through* it if each of the three points that this scan measured next to the line of
 /// sight lies behind it, so far that it stands clear of their planes. A point of the part leaves it if another scan saw
 /// through it and it agrees with fewer than two points of others: flying points, clutter next to the part. A point of
-/// the margin joins the part if it agrees with two that also face alike and nobody saw through it: walls of a boss that
+/// the margin joins the part if it agrees with three that also face alike and nobody saw through it: walls of a boss that
 /// were too narrow to be told from flying points within one scan. A place that only one scan saw stays as it is.
 ///
 /// The same for any number of threads and any order of the segments. Cost: O(n) but for look-ups, and one look-up for

@@ -48,8 +48,7 @@ fuse::PosedSegment part_of(const Segment& segment, const PosedScan& scan) {
   fuse::PosedSegment part;
   part.model_from_scan = scan.model_from_local;
   part.noise_sigma_mm = scan.noise_sigma_mm;
-  part.spacing_mm = scan.spacing_mm;
-  part.scan_index = scan.index;
+  part.scan_index = scan.index;  // the spacing is measured: a hall has another than the part in it
   for (std::size_t i = 0; i < segment.is_part.size(); ++i) {
     if (segment.is_part[i] == 0) continue;
     part.segment_in_scan.positions.push_back(segment.cloud.positions[i]);
@@ -72,7 +71,7 @@ Result<std::vector<fuse::PosedSegment>> recut_segments(const RefinedComponent& c
     scan.part = scan.taken_out = {};
     ASBUILT_TRY(segment, segment_of(scan, record, folder));
     seen.push_back({std::move(segment.cloud), segment.is_part, scan.model_from_local, scan.noise_sigma_mm,
-                    scan.spacing_mm, scan.viewpoint});
+                    scan.viewpoint});
     segments.push_back(std::move(segment));
   }
   std::vector<std::vector<std::uint8_t>> flags;

@@ -40,7 +40,6 @@ Scene scan_of(std::uint64_t index, bool with_boss, bool boss_is_part = true) {
     }
   }
   scene.segment.noise_sigma_mm = kSigma;
-  scene.segment.spacing_mm = kSpacing;
   scene.segment.viewpoint = {scan::Viewpoint::Kind::point, {10.0 + 5.0 * static_cast<double>(index), 10.0, 200.0}};
   return scene;
 }
