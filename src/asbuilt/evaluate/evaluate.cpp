@@ -125,8 +125,8 @@ struct AlignedDistance {
 // Mean distance to the surface after the best motion from either start: where the poses put the points, and where the
 // motion `towards_truth` does (the two differ when the whole result is off, for example by a symmetry).
 AlignedDistance aligned_distance(const std::vector<Eigen::Vector3d>& points, const Pose& towards_truth,
-                             const TriangleMesh& mesh, const model::SurfaceDistance& surface, double noise_mm,
-                             const Context& context) {
+                                 const TriangleMesh& mesh, const model::SurfaceDistance& surface, double noise_mm,
+                                 const Context& context) {
   AlignedDistance best;
   for (const Pose& start : {Pose(Pose::Identity()), towards_truth}) {
     const Pose motion = best_motion_onto(points, mesh, surface, noise_mm, start, context);

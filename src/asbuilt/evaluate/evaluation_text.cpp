@@ -58,12 +58,12 @@ std::string percent(const std::optional<double>& share, int digits) {
 
 std::string reconstruction_line(const Evaluation& evaluation) {
   if (!evaluation.reconstruction_beyond_share && !evaluation.reconstruction_completeness) return {};
-  return fmt::format("reconstruction: {} mm from the true surface in the mean, {} of {} points beyond 6 sigma ({}; true "
-                     "points under true poses {}), completeness {}\n",
-                     figure(evaluation.reconstruction_distance_mm, 4), evaluation.reconstruction_beyond,
-                     evaluation.reconstruction_points,
-                     percent(evaluation.reconstruction_beyond_share, 3), percent(evaluation.oracle_beyond_share, 3),
-                     percent(evaluation.reconstruction_completeness, 2));
+  return fmt::format(
+      "reconstruction: {} mm from the true surface in the mean, {} of {} points beyond 6 sigma ({}; true "
+      "points under true poses {}), completeness {}\n",
+      figure(evaluation.reconstruction_distance_mm, 4), evaluation.reconstruction_beyond,
+      evaluation.reconstruction_points, percent(evaluation.reconstruction_beyond_share, 3),
+      percent(evaluation.oracle_beyond_share, 3), percent(evaluation.reconstruction_completeness, 2));
 }
 
 }  // namespace

@@ -42,8 +42,7 @@ std::vector<std::uint8_t> covered(const PointCloud& samples, const PointCloud& f
   const KdTree tree(feet.positions);
   const auto reach = static_cast<float>(reach_mm);
   parallel_for(context, samples.size(), kGrain, [&](std::size_t i) {
-    const auto found =
-        tree.nearest_facing(samples.positions[i], reach, feet.normals, samples.normals[i], kSameSide);
+    const auto found = tree.nearest_facing(samples.positions[i], reach, feet.normals, samples.normals[i], kSameSide);
     result[i] = found.found() ? 1 : 0;
   });
   return result;
@@ -65,9 +64,8 @@ PointsBeyond points_beyond(std::span<const Eigen::Vector3d> points, double dista
   return result;
 }
 
-double completeness(std::span<const Eigen::Vector3d> cloud, std::span<const Eigen::Vector3d> reference,
-                    double reach_mm, const TriangleMesh& mesh, const model::SurfaceDistance& surface,
-                    const Context& context) {
+double completeness(std::span<const Eigen::Vector3d> cloud, std::span<const Eigen::Vector3d> reference, double reach_mm,
+                    const TriangleMesh& mesh, const model::SurfaceDistance& surface, const Context& context) {
   ASBUILT_EXPECT(reach_mm > 0.0, "a positive reach");
   const PointCloud samples = model::even_samples(mesh, 0.5 * reach_mm, kSampleSeed, context);
   const auto in_reference = covered(samples, feet(reference, mesh, surface, context), reach_mm, context);

@@ -22,8 +22,8 @@ constexpr double kAbsorbInSpacings = 0.75;  // any point of a square lattice of 
 constexpr double kMergeInSpacings = 1.0;
 constexpr double kLayerInSigmas = 4.0;     // along the normal: two samples of one surface differ by no more
 constexpr double kLayerInSpacings = 0.25;  // ... plus what surface shape does within the merge distance
-constexpr double kMeanInSigmas = 3.0;     // of the difference of two samples: a mean is of one quantity
-constexpr double kMeanTilt = 0.05;        // radians by which normals may err
+constexpr double kMeanInSigmas = 3.0;      // of the difference of two samples: a mean is of one quantity
+constexpr double kMeanTilt = 0.05;         // radians by which normals may err
 constexpr double kIsolationInSpacings = 5.0;
 constexpr int kIsolatedGroup = 2;           // a point with at most one other near is isolated
 constexpr float kNormalMeanCosine = 0.94F;  // 20 degrees: normals that are averaged
@@ -62,7 +62,8 @@ Result<void> check(const PosedSegment& segment, std::size_t place) {
   }
   for (const auto& [what, count] :
        {std::pair("colours", segment.colours.size()), std::pair("intensities", segment.intensities.size())}) {
-    if (count != 0 && count != cloud.size()) return bad(fmt::format("has {} {} for {} points", count, what, cloud.size()));
+    if (count != 0 && count != cloud.size())
+      return bad(fmt::format("has {} {} for {} points", count, what, cloud.size()));
   }
   if (!is_rigid(segment.model_from_scan.matrix())) return bad("has a pose that is not a rigid motion");
   if (!(segment.noise_sigma_mm >= 0.0) || !std::isfinite(segment.noise_sigma_mm)) {
@@ -175,7 +176,8 @@ std::vector<char> kept_samples(const Union& all, const PointGrid& grid, const Sa
 }
 
 // Samples that differ by no more than their noise explains. Others of the same surface count as having seen it, but
-// would pull the mean off it: the far side of a profile that is no wider than the samples are apart, an edge's other face.
+// would pull the mean off it: the far side of a profile that is no wider than the samples are apart, an edge's other
+// face.
 struct Averaging {
   bool noise_is_known = false;
 
@@ -307,7 +309,8 @@ std::vector<char> isolated_points(const Union& all, const Context& context) {
 
 Reconstruction collected(std::span<const Fused> fused, const Union& all) {
   Reconstruction result;
-  const bool coloured = std::ranges::any_of(all.segments, [](const auto* segment) { return !segment->colours.empty(); });
+  const bool coloured =
+      std::ranges::any_of(all.segments, [](const auto* segment) { return !segment->colours.empty(); });
   const bool with_intensity =
       std::ranges::any_of(all.segments, [](const auto* segment) { return !segment->intensities.empty(); });
   for (const Fused& sample : fused) {

@@ -19,9 +19,9 @@ using Colour = std::array<std::uint8_t, 3>;  ///< red, green, blue
 struct PosedSegment {
   PointCloud segment_in_scan;
   Pose model_from_scan = Pose::Identity();
-  double noise_sigma_mm = 0.0;  ///< 0: unknown
-  double spacing_mm = 0.0;      ///< 0: measured
-  int scan_index = 0;           ///< index in result.json
+  double noise_sigma_mm = 0.0;          ///< 0: unknown
+  double spacing_mm = 0.0;              ///< 0: measured
+  int scan_index = 0;                   ///< index in result.json
   std::vector<Colour> colours = {};     ///< as the sensor saw it; empty or one a point
   std::vector<float> intensities = {};  ///< likewise
 };

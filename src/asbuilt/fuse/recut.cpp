@@ -18,11 +18,11 @@ namespace {
 
 constexpr std::size_t kGrain = 1024;
 constexpr double kAroundInSpacings = 2.0;
-constexpr int kConfirming = 2, kJoining = 3;  // one alone may fly, too; the scan itself took margin for margin
-constexpr double kAgreeInSigmas = 1.5;        // of the difference of two samples
-constexpr double kAgreeTilt = 0.03;           // radians by which normals may err
-constexpr float kFacingAlike = 0.7F;          // cosine, 45 degrees
-constexpr std::size_t kRays = 3;              // next to the line of sight
+constexpr int kConfirming = 2, kJoining = 3;      // one alone may fly, too; the scan itself took margin for margin
+constexpr double kAgreeInSigmas = 1.5;            // of the difference of two samples
+constexpr double kAgreeTilt = 0.03;               // radians by which normals may err
+constexpr float kFacingAlike = 0.7F;              // cosine, 45 degrees
+constexpr std::size_t kRays = 3;                  // next to the line of sight
 constexpr double kNextRay = 1.5, kLastRay = 3.0;  // how near, in spacings: a hole in the scan is no view through
 constexpr double kThroughInSigmas = 2.5;
 constexpr double kThroughTilt = 0.05;
@@ -51,7 +51,9 @@ class Eye {
     const double depth = depth_of(point);
     if (is_point() && !(depth > 0.0)) return false;
     rays_->nearest(key(point), kRays, neighbours);
-    const auto key_distance = [&](std::size_t i) { return std::sqrt(static_cast<double>(neighbours[i].squared_distance)); };
+    const auto key_distance = [&](std::size_t i) {
+      return std::sqrt(static_cast<double>(neighbours[i].squared_distance));
+    };
     if (key_distance(0) > kNextRay * spacing_ || key_distance(kRays - 1) > kLastRay * spacing_) return false;
     const double tolerance = kThroughInSigmas * std::hypot(sigma, scale_.sigma);
     for (std::size_t i = 0; i < kRays; ++i) {

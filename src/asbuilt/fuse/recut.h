@@ -29,8 +29,8 @@ struct SeenSegment {
 /// within noise. Another scan *saw through* it if each of the three points that this scan measured next to the line of
 /// sight lies behind it, so far that it stands clear of their planes. A point of the part leaves it if another scan saw
 /// through it and it agrees with fewer than two points of others: flying points, clutter next to the part. A point of
-/// the margin joins the part if it agrees with three that also face alike and nobody saw through it: walls of a boss that
-/// were too narrow to be told from flying points within one scan. A place that only one scan saw stays as it is.
+/// the margin joins the part if it agrees with three that also face alike and nobody saw through it: walls of a boss
+/// that were too narrow to be told from flying points within one scan. A place that only one scan saw stays as it is.
 ///
 /// The same for any number of threads and any order of the segments. Cost: O(n) but for look-ups, and one look-up for
 /// each scan at points that hardly agree. Errors: invalid_argument (flags or normals are not one a point), cancelled.

@@ -37,8 +37,7 @@ std::vector<Eigen::Vector3f> surface_normals(const PointCloud& cloud, double noi
                                              const Context& context) {
   if (!(noise_sigma_mm > 0.0 && spacing_mm > 0.0) || cloud.size() <= kNeighbours) return cloud.normals;
   const KdTree tree(cloud.positions);
-  const std::vector<Eigen::Vector3f> fitted =
-      scan::face_normals(cloud, tree, noise_sigma_mm, spacing_mm, context);
+  const std::vector<Eigen::Vector3f> fitted = scan::face_normals(cloud, tree, noise_sigma_mm, spacing_mm, context);
   const float limit = kLimitInSigmas * static_cast<float>(noise_sigma_mm);
   std::vector<Eigen::Vector3f> normals = cloud.normals;
   parallel_for_blocks(context, cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {

@@ -13,8 +13,9 @@ namespace asbuilt::fuse {
 ///
 /// The cloud's own normals lean wherever an edge is near, and on a thin profile that is everywhere. So normals are
 /// fitted to the points of one face each (scan/face_normals.h). They replace a given one that they contradict by more
-/// than 8 degrees, if under them clearly more of the nearest neighbours lie on one surface with the point; on a curved surface
-/// sampled coarsely they do not. Without noise or spacing (0) the given ones stand. The same for any number of threads.
+/// than 8 degrees, if under them clearly more of the nearest neighbours lie on one surface with the point; on a curved
+/// surface sampled coarsely they do not. Without noise or spacing (0) the given ones stand. The same for any number of
+/// threads.
 [[nodiscard]] std::vector<Eigen::Vector3f> surface_normals(const PointCloud& cloud, double noise_sigma_mm,
                                                            double spacing_mm, const Context& context);
 

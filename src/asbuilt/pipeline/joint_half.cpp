@@ -172,7 +172,8 @@ Result<fuse::Reconstruction> fused(Registration& registration, const io::RunReco
       ASBUILT_CHECK(restore_segments(registration.scans, record, folder));
     }
     for (std::size_t i = registration.components.size(); i-- > 0;) {  // the largest, which is the first, is kept
-      ASBUILT_TRY(cut, recut_segments(registration.components[i], registration.scans, record, options, folder, context));
+      ASBUILT_TRY(cut,
+                  recut_segments(registration.components[i], registration.scans, record, options, folder, context));
       parts = std::move(cut);
     }
   }

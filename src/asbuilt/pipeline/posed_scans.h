@@ -25,8 +25,8 @@ namespace asbuilt::pipeline {
 struct PosedScan {
   int index = 0;                                      ///< in the record
   PointCloud part;                                    ///< in the scan frame minus the offset
-  PointCloud taken_out;         ///< by remove_seen_through
-  std::vector<std::uint32_t> taken_from;  ///< where these stood in `part` as read, ascending
+  PointCloud taken_out;                               ///< by remove_seen_through
+  std::vector<std::uint32_t> taken_from;              ///< where these stood in `part` as read, ascending
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is

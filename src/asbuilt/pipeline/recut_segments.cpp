@@ -70,8 +70,8 @@ Result<std::vector<fuse::PosedSegment>> recut_segments(const RefinedComponent& c
     PosedScan& scan = scans[static_cast<std::size_t>(member)];
     scan.part = scan.taken_out = {};
     ASBUILT_TRY(segment, segment_of(scan, record, folder));
-    seen.push_back({std::move(segment.cloud), segment.is_part, scan.model_from_local, scan.noise_sigma_mm,
-                    scan.viewpoint});
+    seen.push_back(
+        {std::move(segment.cloud), segment.is_part, scan.model_from_local, scan.noise_sigma_mm, scan.viewpoint});
     segments.push_back(std::move(segment));
   }
   std::vector<std::vector<std::uint8_t>> flags;
@@ -100,9 +100,8 @@ Result<void> restore_segments(const std::vector<PosedScan>& kept, const io::RunR
   for (std::size_t i = 0; i < record.scans.size(); ++i) {
     const io::ScanRecord& scan = record.scans[i];
     const fs::path path = folder.file(io::segment_file(i, scan.name));
-    const bool is_kept = std::ranges::any_of(kept, [&](const PosedScan& posed) {
-      return posed.index == static_cast<int>(i);
-    });
+    const bool is_kept =
+        std::ranges::any_of(kept, [&](const PosedScan& posed) { return posed.index == static_cast<int>(i); });
     if (std::error_code ignored; is_kept || !scan.has_segment() || !fs::exists(path, ignored)) continue;
     ASBUILT_TRY(segment, read_segment(path, scan.offset));
     if (segment.was_part_detected.empty()) continue;

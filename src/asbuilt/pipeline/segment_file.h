@@ -22,8 +22,8 @@ struct Segment {
   std::vector<std::uint8_t> is_part;  ///< one per point: 1 part, 0 margin
   /// The same as the scan half had cut it out, where the joint half has cut it anew; else empty.
   std::vector<std::uint8_t> was_part_detected;
-  std::vector<io::Rgb> colours;       ///< empty or one per point, from the scan's file
-  std::vector<float> intensities;     ///< likewise
+  std::vector<io::Rgb> colours;    ///< empty or one per point, from the scan's file
+  std::vector<float> intensities;  ///< likewise
 };
 
 /// Cuts segment and margin out of a scan. Where the scan's own normals have no trustworthy sign, they take that of the
