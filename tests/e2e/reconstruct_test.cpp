@@ -143,6 +143,15 @@ TEST_F(Reconstruct, StopsWhenAskedAndGoesOnToTheSameBytes) {
   fs::remove_all(result());
   ASSERT_TRUE(reconstruct().has_value());
   EXPECT_EQ(io::read_file(result() / "result.json").value(), resumed.value());
+
+  // Again over the finished result, whose segments were cut anew: the joint half begins with those of the scan half.
+  const std::vector<fs::path> files{result() / "reconstruction.ply", result() / io::segment_file(0, "scan_00"),
+                                    result() / io::segment_file(1, "scan_01")};
+  std::vector<std::string> first;
+  for (const fs::path& file : files) first.push_back(io::read_file(file).value());
+  EXPECT_NE(io::read_ply_vertices(files[1]).value().find("part_detected"), nullptr);
+  ASSERT_TRUE(reconstruct().has_value());
+  for (std::size_t i = 0; i < files.size(); ++i) EXPECT_EQ(io::read_file(files[i]).value(), first[i]) << files[i];
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <map>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/evaluate/reconstruction_error.h"
 #include "asbuilt/evaluate/surface_error.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/ply_writer.h"
@@ -16,6 +18,10 @@
 
 namespace asbuilt::evaluate {
 namespace {
+
+constexpr double kFarInSigmas = 6.0;      // from the true surface: no noise, but a flying point, clutter, a wrong pose
+constexpr double kReachInSpacings = 3.0;  // a sensor's own samples leave no larger gaps
+constexpr const char* kReconstruction = "reconstruction.ply";
 
 using EntriesByName = std::map<std::string, std::vector<std::size_t>>;
 
@@ -74,17 +80,34 @@ Result<SegmentFigures> segment_figures(const std::filesystem::path& file, const 
                         all == 0 ? 0.0 : static_cast<double>(hits) / static_cast<double>(all)};
 }
 
-// The part's points of all accepted scans, under our poses and under the true ones.
+// The part's points of all accepted scans, under our poses and under the true ones, and of all scans that show it.
 struct PartPoints {
   std::vector<Eigen::Vector3d> ours, truth;
+  std::vector<Eigen::Vector3d> reference;  // all scans, true poses
+  std::vector<double> spacings_mm;         // of the part's points, one a scan
 };
 
-void append(PartPoints& points, const LabelledPoints& scan, const Pose& ours, const TruePlacement& truth) {
+std::vector<Eigen::Vector3f> part_points(const LabelledPoints& scan, std::uint8_t label) {
+  std::vector<Eigen::Vector3f> points_in_scan;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    const Eigen::Vector3d& point = scan.points_in_scan[i];
+    if (scan.labels[i] == label && point.allFinite()) points_in_scan.emplace_back(point.cast<float>());
+  }
+  return points_in_scan;
+}
+
+void append(PartPoints& points, const LabelledPoints& scan, const std::optional<Pose>& ours,
+            const TruePlacement& truth) {
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
     if (scan.labels[i] != truth.label || !scan.points_in_scan[i].allFinite()) continue;
-    points.ours.push_back(ours * scan.points_in_scan[i]);
-    points.truth.push_back(truth.model_from_scan * scan.points_in_scan[i]);
+    const Eigen::Vector3d true_point = truth.model_from_scan * scan.points_in_scan[i];
+    points.reference.push_back(true_point);
+    if (!ours) continue;
+    points.ours.push_back(*ours * scan.points_in_scan[i]);
+    points.truth.push_back(true_point);
   }
+  const double spacing_mm = median_spacing(part_points(scan, truth.label));
+  if (spacing_mm > 0.0) points.spacings_mm.push_back(spacing_mm);
 }
 
 std::vector<Eigen::Vector3d> moved(const std::vector<Eigen::Vector3d>& points, const Pose& motion) {
@@ -94,31 +117,71 @@ std::vector<Eigen::Vector3d> moved(const std::vector<Eigen::Vector3d>& points, c
   return result;
 }
 
+struct AlignedDistance {
+  double mean_mm = std::numeric_limits<double>::infinity();
+  Pose motion = Pose::Identity();
+};
+
 // Mean distance to the surface after the best motion from either start: where the poses put the points, and where the
 // motion `towards_truth` does (the two differ when the whole result is off, for example by a symmetry).
-double aligned_mean_distance(const std::vector<Eigen::Vector3d>& points, const Pose& towards_truth,
-                             const TriangleMesh& mesh, const model::SurfaceDistance& surface, double noise_mm,
-                             const Context& context) {
-  double best = std::numeric_limits<double>::infinity();
+AlignedDistance aligned_distance(const std::vector<Eigen::Vector3d>& points, const Pose& towards_truth,
+                                 const TriangleMesh& mesh, const model::SurfaceDistance& surface, double noise_mm,
+                                 const Context& context) {
+  AlignedDistance best;
   for (const Pose& start : {Pose(Pose::Identity()), towards_truth}) {
     const Pose motion = best_motion_onto(points, mesh, surface, noise_mm, start, context);
-    best = std::min(best, mean_surface_distance(moved(points, motion), surface, context));
+    const double mean_mm = mean_surface_distance(moved(points, motion), surface, context);
+    if (mean_mm < best.mean_mm) best = {mean_mm, motion};
   }
   return best;
 }
 
-void judge_accuracy(Evaluation& evaluation, const PartPoints& points, const TriangleMesh& as_built,
-                    const Context& context) {
+// The reconstruction's points, moved as the scans were that it is made of.
+Result<std::vector<Eigen::Vector3d>> reconstruction_points(const std::filesystem::path& file, const Pose& motion) {
+  ASBUILT_TRY(vertices, io::read_ply_vertices(file));
+  const auto *x = vertices.find("x"), *y = vertices.find("y"), *z = vertices.find("z");
+  if (x == nullptr || y == nullptr || z == nullptr) {
+    return fail(ErrorCode::unreadable_input, fmt::format("{}: has no columns x, y and z", file.string()));
+  }
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t i = 0; i < x->size(); ++i) points.emplace_back(motion * Eigen::Vector3d((*x)[i], (*y)[i], (*z)[i]));
+  return points;
+}
+
+Result<void> judge_reconstruction(Evaluation& evaluation, const PartPoints& points, const std::filesystem::path& file,
+                                  const Pose& ours, const Pose& truth, const TriangleMesh& as_built,
+                                  const model::SurfaceDistance& surface, const Context& context) {
+  ASBUILT_TRY(cloud, reconstruction_points(file, ours));
+  evaluation.reconstruction_distance_mm = mean_surface_distance(cloud, surface, context);
+  if (evaluation.noise_sigma_mm > 0.0) {
+    const double far_mm = kFarInSigmas * evaluation.noise_sigma_mm;
+    const PointsBeyond beyond = points_beyond(cloud, far_mm, surface, context);
+    evaluation.reconstruction_points = beyond.points;
+    evaluation.reconstruction_beyond = beyond.beyond;
+    evaluation.reconstruction_beyond_share = beyond.share();
+    evaluation.oracle_beyond_share = points_beyond(moved(points.truth, truth), far_mm, surface, context).share();
+  }
+  if (points.spacings_mm.empty()) return {};
+  std::vector<double> spacings_mm = points.spacings_mm;
+  const auto middle = spacings_mm.begin() + static_cast<std::ptrdiff_t>(spacings_mm.size() / 2);
+  std::ranges::nth_element(spacings_mm, middle);
+  evaluation.reconstruction_completeness =
+      completeness(cloud, moved(points.reference, truth), kReachInSpacings * *middle, as_built, surface, context);
+  return {};
+}
+
+Result<void> judge_accuracy(Evaluation& evaluation, const PartPoints& points, const TriangleMesh& as_built,
+                            const std::filesystem::path& reconstruction, const Context& context) {
   evaluation.part_points = points.ours.size();
-  if (points.ours.size() < 6) return;
+  if (points.ours.size() < 6) return {};
   const double sigma = evaluation.noise_sigma_mm;
   const double noise_mm = sigma > 0.0 ? sigma : 1e-5 * evaluation.diameter_mm;
   const Pose true_from_ours = best_rigid_motion(points.ours, points.truth);
   const model::SurfaceDistance surface(as_built);
-  evaluation.mean_distance_mm =
-      aligned_mean_distance(points.ours, true_from_ours, as_built, surface, noise_mm, context);
-  evaluation.oracle_distance_mm =
-      aligned_mean_distance(points.truth, Pose::Identity(), as_built, surface, noise_mm, context);
+  const AlignedDistance ours = aligned_distance(points.ours, true_from_ours, as_built, surface, noise_mm, context);
+  const AlignedDistance truth = aligned_distance(points.truth, Pose::Identity(), as_built, surface, noise_mm, context);
+  evaluation.mean_distance_mm = ours.mean_mm;
+  evaluation.oracle_distance_mm = truth.mean_mm;
   if (*evaluation.oracle_distance_mm > 0.0) {
     evaluation.ratio_to_oracle = *evaluation.mean_distance_mm / *evaluation.oracle_distance_mm;
   }
@@ -128,6 +191,9 @@ void judge_accuracy(Evaluation& evaluation, const PartPoints& points, const Tria
   }
   evaluation.relative_pose_error_mm = std::sqrt(squares / static_cast<double>(points.ours.size()));
   if (sigma > 0.0) evaluation.relative_pose_error_sigma = *evaluation.relative_pose_error_mm / sigma;
+  if (std::error_code ignored; !std::filesystem::exists(reconstruction, ignored)) return {};
+  return judge_reconstruction(evaluation, points, reconstruction, ours.motion, truth.motion, as_built, surface,
+                              context);
 }
 
 // The part, and the symmetry by which its poses are judged: that of the truth if it names one, else found when a pose
@@ -277,13 +343,17 @@ Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, con
     for (std::size_t i = 0; i < lines.size(); ++i) {
       ScanFigures figures = figures_of(scan, lines[i], record, part);
       if (i > 0) figures.name += fmt::format("#{}", i + 1);
-      if (figures.error && !scan.labels.empty()) {
+      if (figures.present && !scan.labels.empty()) {
         if (!labelled) {
           ASBUILT_TRY(read, read_labelled_points(truth, scan));
           labelled = std::move(read);
         }
+        const std::optional<Pose> pose =
+            figures.accepted ? record.scans[*lines[i].entry].model_from_scan : std::nullopt;
+        append(points, *labelled, pose, *lines[i].placement);
+      }
+      if (figures.error && labelled) {
         const io::ScanRecord& ours = record.scans[*lines[i].entry];
-        if (figures.accepted) append(points, *labelled, *ours.model_from_scan, *lines[i].placement);
         const std::filesystem::path segment = result_folder / io::segment_file(*lines[i].entry, ours.name);
         if (std::error_code ignored; ours.has_segment() && std::filesystem::exists(segment, ignored)) {
           ASBUILT_TRY(segmentation, segment_figures(segment, *labelled, lines[i].placement->label));
@@ -302,7 +372,7 @@ Result<Evaluation> evaluate(const Truth& truth, const io::RunRecord& record, con
                             truth.scans.size(), truth.scans.front().path.filename().string()));
   }
   count(evaluation, tolerance_mm);
-  judge_accuracy(evaluation, points, as_built, context);
+  ASBUILT_CHECK(judge_accuracy(evaluation, points, as_built, result_folder / kReconstruction, context));
   context.report_progress(1.0);
   return evaluation;
 }

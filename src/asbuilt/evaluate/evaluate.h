@@ -52,7 +52,16 @@ struct Evaluation {
   std::optional<double> ratio_to_oracle;
   std::optional<double> relative_pose_error_mm;     ///< RMS of |G T_ours p - T_true p| over these points, one best G
   std::optional<double> relative_pose_error_sigma;  ///< the same / noise sigma
-  std::vector<ScanFigures> per_scan;                ///< in the order of the truth
+
+  // Of reconstruction.ply, where there is one; after the motion under which mean_distance_mm is taken.
+  std::optional<double> reconstruction_distance_mm;  ///< mean distance of its points to the true as-built surface
+  std::size_t reconstruction_points = 0;
+  std::size_t reconstruction_beyond = 0;              ///< further than 6 sigma from the true as-built surface
+  std::optional<double> reconstruction_beyond_share;  ///< of the points
+  std::optional<double> oracle_beyond_share;          ///< the same of the truly labelled points under the true poses
+  std::optional<double> reconstruction_completeness;  ///< share of the area that all scans' true points cover
+
+  std::vector<ScanFigures> per_scan;  ///< in the order of the truth
 };
 
 /// Compares the result.json of `result_folder` with the truth (truth.json or its folder). Scans are matched by file

@@ -52,6 +52,20 @@ std::string line_of(const ScanFigures& scan) {
                      figure(scan.segment_recall, 3), scan.occlusion, scan.hidden, scan.clutter);
 }
 
+std::string percent(const std::optional<double>& share, int digits) {
+  return share ? fmt::format("{:.{}f} %", 100.0 * *share, digits) : "-";
+}
+
+std::string reconstruction_line(const Evaluation& evaluation) {
+  if (!evaluation.reconstruction_beyond_share && !evaluation.reconstruction_completeness) return {};
+  return fmt::format(
+      "reconstruction: {} mm from the true surface in the mean, {} of {} points beyond 6 sigma ({}; true "
+      "points under true poses {}), completeness {}\n",
+      figure(evaluation.reconstruction_distance_mm, 4), evaluation.reconstruction_beyond,
+      evaluation.reconstruction_points, percent(evaluation.reconstruction_beyond_share, 3),
+      percent(evaluation.oracle_beyond_share, 3), percent(evaluation.reconstruction_completeness, 2));
+}
+
 }  // namespace
 
 std::string to_json(const Evaluation& evaluation) {
@@ -72,6 +86,12 @@ std::string to_json(const Evaluation& evaluation) {
             {"ratio_to_oracle", value_or_null(evaluation.ratio_to_oracle)},
             {"relative_pose_error_mm", value_or_null(evaluation.relative_pose_error_mm)},
             {"relative_pose_error_sigma", value_or_null(evaluation.relative_pose_error_sigma)},
+            {"reconstruction_distance_mm", value_or_null(evaluation.reconstruction_distance_mm)},
+            {"reconstruction_points", evaluation.reconstruction_points},
+            {"reconstruction_beyond", evaluation.reconstruction_beyond},
+            {"reconstruction_beyond_share", value_or_null(evaluation.reconstruction_beyond_share)},
+            {"oracle_beyond_share", value_or_null(evaluation.oracle_beyond_share)},
+            {"reconstruction_completeness", value_or_null(evaluation.reconstruction_completeness)},
             {"per_scan", Json::array()}};
   for (const ScanFigures& scan : evaluation.per_scan) json["per_scan"].push_back(json_of(scan));
   return json.dump(2) + "\n";
@@ -94,7 +114,7 @@ std::string to_table(const Evaluation& evaluation) {
                       evaluation.present);
   text += fmt::format("relative pose error {} sigma ({} mm)\n", figure(evaluation.relative_pose_error_sigma, 3),
                       figure(evaluation.relative_pose_error_mm, 4));
-  return text;
+  return text + reconstruction_line(evaluation);
 }
 
 }  // namespace asbuilt::evaluate

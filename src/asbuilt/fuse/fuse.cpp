@@ -13,6 +13,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/fuse/point_grid.h"
+#include "asbuilt/fuse/surface_normals.h"
 
 namespace asbuilt::fuse {
 namespace {
@@ -21,6 +22,8 @@ constexpr double kAbsorbInSpacings = 0.75;  // any point of a square lattice of 
 constexpr double kMergeInSpacings = 1.0;
 constexpr double kLayerInSigmas = 4.0;     // along the normal: two samples of one surface differ by no more
 constexpr double kLayerInSpacings = 0.25;  // ... plus what surface shape does within the merge distance
+constexpr double kMeanInSigmas = 3.0;      // of the difference of two samples: a mean is of one quantity
+constexpr double kMeanTilt = 0.05;         // radians by which normals may err
 constexpr double kIsolationInSpacings = 5.0;
 constexpr int kIsolatedGroup = 2;           // a point with at most one other near is isolated
 constexpr float kNormalMeanCosine = 0.94F;  // 20 degrees: normals that are averaged
@@ -36,6 +39,17 @@ struct Union {
   std::vector<std::uint16_t> scan_of;  // position in `scans`
   std::vector<Scan> scans;
   std::vector<std::size_t> starts;  // first point of each scan, one more at the end
+  std::vector<const PosedSegment*> segments;
+
+  // What the sensor saw at a point beside its place; null where its scan has none.
+  [[nodiscard]] const Colour* colour(std::size_t point) const {
+    const std::size_t scan = scan_of[point];
+    return segments[scan]->colours.empty() ? nullptr : &segments[scan]->colours[point - starts[scan]];
+  }
+  [[nodiscard]] const float* intensity(std::size_t point) const {
+    const std::size_t scan = scan_of[point];
+    return segments[scan]->intensities.empty() ? nullptr : &segments[scan]->intensities[point - starts[scan]];
+  }
 };
 
 Result<void> check(const PosedSegment& segment, std::size_t place) {
@@ -45,6 +59,11 @@ Result<void> check(const PosedSegment& segment, std::size_t place) {
   };
   if (cloud.normals.size() != cloud.size()) {
     return bad(fmt::format("has {} normals for {} points", cloud.normals.size(), cloud.size()));
+  }
+  for (const auto& [what, count] :
+       {std::pair("colours", segment.colours.size()), std::pair("intensities", segment.intensities.size())}) {
+    if (count != 0 && count != cloud.size())
+      return bad(fmt::format("has {} {} for {} points", count, what, cloud.size()));
   }
   if (!is_rigid(segment.model_from_scan.matrix())) return bad("has a pose that is not a rigid motion");
   if (!(segment.noise_sigma_mm >= 0.0) || !std::isfinite(segment.noise_sigma_mm)) {
@@ -64,7 +83,7 @@ Result<void> check(const PosedSegment& segment, std::size_t place) {
   return {};
 }
 
-Union union_of(std::span<const PosedSegment> segments, const Context& context) {
+Union union_of(std::span<const PosedSegment> segments, bool fit_faces, const Context& context) {
   std::vector<Scan> scans(segments.size());
   for (std::size_t s = 0; s < segments.size(); ++s) {
     const double measured =
@@ -79,6 +98,8 @@ Union union_of(std::span<const PosedSegment> segments, const Context& context) {
   Union all;
   for (const std::size_t s : order) {
     const PointCloud& from = segments[s].segment_in_scan;
+    const std::vector<Eigen::Vector3f> normals =
+        fit_faces ? surface_normals(from, scans[s].sigma, scans[s].spacing, context) : from.normals;
     const Pose& pose = segments[s].model_from_scan;
     const std::size_t start = all.cloud.size();
     all.starts.push_back(start);
@@ -87,9 +108,10 @@ Union union_of(std::span<const PosedSegment> segments, const Context& context) {
     all.scan_of.resize(start + from.size(), static_cast<std::uint16_t>(all.scans.size()));
     parallel_for(context, from.size(), 1 << 14, [&](std::size_t i) {
       all.cloud.positions[start + i] = (pose * from.positions[i].cast<double>()).cast<float>();
-      all.cloud.normals[start + i] = (pose.linear() * from.normals[i].cast<double>()).cast<float>();
+      all.cloud.normals[start + i] = (pose.linear() * normals[i].cast<double>()).cast<float>();
     });
     all.scans.push_back(scans[s]);
+    all.segments.push_back(&segments[s]);
   }
   all.starts.push_back(all.cloud.size());
   return all;
@@ -153,10 +175,52 @@ std::vector<char> kept_samples(const Union& all, const PointGrid& grid, const Sa
   return kept;
 }
 
+// Samples that differ by no more than their noise explains. Others of the same surface count as having seen it, but
+// would pull the mean off it: the far side of a profile that is no wider than the samples are apart, an edge's other
+// face.
+struct Averaging {
+  bool noise_is_known = false;
+
+  [[nodiscard]] bool holds(const Union& all, std::size_t a, std::size_t b) const {
+    if (!noise_is_known) return true;
+    const double noise = std::hypot(all.scans[all.scan_of[a]].sigma, all.scans[all.scan_of[b]].sigma);
+    const double apart = static_cast<double>((all.cloud.positions[b] - all.cloud.positions[a]).norm());
+    return std::abs(SameSurface::height(all.cloud, a, b)) <= kMeanInSigmas * noise + kMeanTilt * apart;
+  }
+};
+
 struct Fused {
   Eigen::Vector3f position, normal;
   std::uint16_t scan = 0, support = 0;
   float sigma = 0.0F;
+  Colour colour{};
+  float intensity = std::numeric_limits<float>::quiet_NaN();
+};
+
+// Means of what the sensors saw, over the samples that have it.
+class Shade {
+ public:
+  void add(const Union& all, std::size_t point, double weight) {
+    if (const Colour* seen = all.colour(point)) {
+      for (std::size_t c = 0; c < 3; ++c) colour_[c] += weight * (*seen)[c];
+      coloured_ += weight;
+    }
+    const float* seen = all.intensity(point);
+    if (seen != nullptr && std::isfinite(*seen)) {
+      intensity_ += weight * static_cast<double>(*seen);
+      with_intensity_ += weight;
+    }
+  }
+  void give_to(Fused& fused) const {
+    for (std::size_t c = 0; c < 3 && coloured_ > 0.0; ++c) {
+      fused.colour[c] = static_cast<std::uint8_t>(std::lround(colour_[c] / coloured_));
+    }
+    if (with_intensity_ > 0.0) fused.intensity = static_cast<float>(intensity_ / with_intensity_);
+  }
+
+ private:
+  std::array<double, 3> colour_{};
+  double coloured_ = 0.0, intensity_ = 0.0, with_intensity_ = 0.0;
 };
 
 struct Weights {
@@ -192,12 +256,16 @@ Fused fused_sample(std::size_t i, const Union& all, const PointGrid& grid, const
                    const Weights& weights, bool move, ScanShares& scans) {
   scans.shares.clear();
   double total = 0.0, height = 0.0;
+  Shade shade;
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   const auto radius = static_cast<float>(same.radius);
+  const Averaging averaging{weights.known};
   grid.along(all.cloud.positions[i], all.cloud.normals[i], radius, [&](std::uint32_t j) {
     if (!same.holds(all.cloud, i, j)) return false;
     const double weight = weights.of_scan[all.scan_of[j]];
     scans.add(all.scan_of[j], weight);
+    if (!averaging.holds(all, i, j)) return false;
+    shade.add(all, j, weight);
     total += weight;
     height += weight * SameSurface::height(all.cloud, i, j);
     if (all.cloud.normals[i].dot(all.cloud.normals[j]) > kNormalMeanCosine) {
@@ -205,17 +273,23 @@ Fused fused_sample(std::size_t i, const Union& all, const PointGrid& grid, const
     }
     return false;
   });
-  Fused fused{all.cloud.positions[i], all.cloud.normals[i], 0, static_cast<std::uint16_t>(scans.shares.size()), 0.0F};
+  Fused fused{.position = all.cloud.positions[i],
+              .normal = all.cloud.normals[i],
+              .support = static_cast<std::uint16_t>(scans.shares.size())};
   if (!move) {
     const Scan& own = all.scans[all.scan_of[i]];
     fused.scan = static_cast<std::uint16_t>(own.index);
     fused.sigma = static_cast<float>(own.sigma);
+    Shade own_shade;
+    own_shade.add(all, i, 1.0);
+    own_shade.give_to(fused);
     return fused;
   }
   fused.position += static_cast<float>(height / total) * all.cloud.normals[i];
   if (normal.squaredNorm() > 0.0F) fused.normal = normal.normalized();
   fused.scan = static_cast<std::uint16_t>(all.scans[scans.dominant()].index);
   fused.sigma = weights.known ? static_cast<float>(1.0 / std::sqrt(total)) : 0.0F;
+  shade.give_to(fused);
   return fused;
 }
 
@@ -233,9 +307,15 @@ std::vector<char> isolated_points(const Union& all, const Context& context) {
   return isolated;
 }
 
-Reconstruction collected(std::span<const Fused> fused) {
+Reconstruction collected(std::span<const Fused> fused, const Union& all) {
   Reconstruction result;
+  const bool coloured =
+      std::ranges::any_of(all.segments, [](const auto* segment) { return !segment->colours.empty(); });
+  const bool with_intensity =
+      std::ranges::any_of(all.segments, [](const auto* segment) { return !segment->intensities.empty(); });
   for (const Fused& sample : fused) {
+    if (coloured) result.colours.push_back(sample.colour);
+    if (with_intensity) result.intensities.push_back(sample.intensity);
     result.cloud.positions.push_back(sample.position);
     result.cloud.normals.push_back(sample.normal);
     result.scan.push_back(sample.scan);
@@ -263,7 +343,7 @@ Result<Reconstruction> fuse(std::span<const PosedSegment> segments, const FuseOp
                             const Context& context) {
   ASBUILT_CHECK(options.validate());
   for (std::size_t i = 0; i < segments.size(); ++i) ASBUILT_CHECK(check(segments[i], i));
-  const Union all = union_of(segments, context);
+  const Union all = union_of(segments, !options.paper_mode, context);
   if (all.cloud.empty()) return fail(ErrorCode::not_possible, "there are no points to fuse");
 
   const double spacing = typical_spacing(all);
@@ -297,7 +377,7 @@ Result<Reconstruction> fuse(std::span<const PosedSegment> segments, const FuseOp
   if (context.cancelled()) return fail(ErrorCode::cancelled, "cancelled while fusing the scans");
   context.report_progress(1.0);
 
-  Reconstruction result = collected(fused);
+  Reconstruction result = collected(fused, all);
   result.merge_distance_mm = options.paper_mode ? 0.0 : same.radius;
   result.isolated_dropped = static_cast<std::size_t>(std::ranges::count(isolated, 1));
   return result;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,13 +13,17 @@
 
 namespace asbuilt::fuse {
 
+using Colour = std::array<std::uint8_t, 3>;  ///< red, green, blue
+
 /// One refined scan: its segment at full density, in the scan frame, with oriented normals.
 struct PosedSegment {
   PointCloud segment_in_scan;
   Pose model_from_scan = Pose::Identity();
-  double noise_sigma_mm = 0.0;  ///< 0: unknown
-  double spacing_mm = 0.0;      ///< 0: measured
-  int scan_index = 0;           ///< index in result.json
+  double noise_sigma_mm = 0.0;          ///< 0: unknown
+  double spacing_mm = 0.0;              ///< 0: measured
+  int scan_index = 0;                   ///< index in result.json
+  std::vector<Colour> colours = {};     ///< as the sensor saw it; empty or one a point
+  std::vector<float> intensities = {};  ///< likewise
 };
 
 struct FuseOptions {
@@ -44,7 +49,11 @@ struct Reconstruction {
   std::vector<std::uint16_t> scan;     ///< the dominant scan of each point
   std::vector<std::uint16_t> support;  ///< number of scans that saw it
   std::vector<float> sigma_mm;         ///< standard error along the normal (of independent sensor noise; 0: unknown)
-  double merge_distance_mm = 0.0;      ///< as used
+  /// Means of the samples that were merged, by precision; one a point if any scan has them, else empty. Points of scans
+  /// without them are black, and have no intensity (NaN).
+  std::vector<Colour> colours;
+  std::vector<float> intensities;
+  double merge_distance_mm = 0.0;  ///< as used
   std::size_t isolated_dropped = 0;
 };
 
@@ -52,8 +61,9 @@ struct Reconstruction {
 ///
 /// The scan with the finest spacing keeps its samples; a sample of a coarser one is absorbed when it lies within 0.75
 /// of its own spacing of a sample that was kept and faces the same way. A kept sample moves along its normal only, to
-/// the mean of all samples around it, each weighted by 1 / sigma^2: where it stands on the surface stays as measured,
-/// so edges are not rounded, and the two sides of a thin wall, whose normals oppose, never meet.
+/// the mean of the samples around it that differ by no more than noise explains, each weighted by 1 / sigma^2: where it
+/// stands on the surface stays as measured, so edges are not rounded, and the two sides of a thin wall, whose normals
+/// oppose, never meet. Normals are fitted anew, to the points of one face each, where noise and spacing are known.
 ///
 /// Same bytes for any number of threads. Cost O(n log n). Errors: invalid_argument (options, normals missing, scan
 /// index out of [0, 65535], non-finite values), not_possible (no points at all), cancelled.

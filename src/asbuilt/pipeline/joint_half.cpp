@@ -7,6 +7,7 @@
 
 #include "asbuilt/fuse/mesh.h"
 #include "asbuilt/pipeline/posed_scans.h"
+#include "asbuilt/pipeline/recut_segments.h"
 #include "asbuilt/pipeline/report.h"
 #include "asbuilt/report/report.h"
 
@@ -159,14 +160,25 @@ void describe_scans(io::RunRecord& record, const Registration& registration, con
   }
 }
 
-Result<fuse::Reconstruction> fused(const RefinedComponent& largest, std::vector<PosedScan>& scans,
-                                   const Options& options, const Context& context) {
-  std::vector<fuse::PosedSegment> segments;
-  for (const int member : largest.members) {
-    PosedScan& scan = scans[static_cast<std::size_t>(member)];
-    segments.push_back({std::move(scan.part), scan.model_from_local, scan.noise_sigma_mm, scan.spacing_mm, scan.index});
+/// Segments cut anew, those of the largest component merged.
+Result<fuse::Reconstruction> fused(Registration& registration, const io::RunRecord& record, const Options& options,
+                                   RunFolder& folder, const Context& context) {
+  std::vector<fuse::PosedSegment> parts;
+  {
+    const auto timed = folder.stage("recut");
+    if (options.paper_mode) {
+      ASBUILT_CHECK(restore_segments({}, record, folder));
+    } else {
+      ASBUILT_CHECK(restore_segments(registration.scans, record, folder));
+    }
+    for (std::size_t i = registration.components.size(); i-- > 0;) {  // the largest, which is the first, is kept
+      ASBUILT_TRY(cut,
+                  recut_segments(registration.components[i], registration.scans, record, options, folder, context));
+      parts = std::move(cut);
+    }
   }
-  return fuse::fuse(segments, options.fuse, context);
+  const auto timed = folder.stage("fuse");
+  return fuse::fuse(parts, options.fuse, context);
 }
 
 /// The surface mesh, if it is wanted. A cloud that makes no surface is worth a warning; the rest of the result stands.
@@ -252,12 +264,7 @@ Result<void> register_scans(const LoadedModel& model, const Options& options, co
   }
   ASBUILT_TRY(registration, register_poses(std::move(scans), model, options, folder, record, context));
 
-  fuse::Reconstruction reconstruction;
-  {
-    const auto timed = folder.stage("fuse");
-    ASBUILT_TRY(fused_scans, fused(registration.components.front(), registration.scans, options, context));
-    reconstruction = std::move(fused_scans);
-  }
+  ASBUILT_TRY(reconstruction, fused(registration, record, options, folder, context));
   ASBUILT_TRY(mesh, surface_of(reconstruction, options, folder, context));
   record.state = io::RunState::complete;
   return inspect_and_report(reconstruction, mesh, model, options, inputs, folder, record, context);

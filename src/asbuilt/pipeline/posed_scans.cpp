@@ -126,24 +126,39 @@ Result<void> remove_seen_through(const RefinedComponent& component, std::vector<
   const std::vector<refine::View> views = views_of(component.members, scans);
   ASBUILT_TRY(marked, refine::seen_through(views, component.refinement.model_from_scan, component.links, context));
   for (std::size_t v = 0; v < views.size(); ++v) {
-    PointCloud& part = scans[static_cast<std::size_t>(component.members[v])].part;
-    PointCloud kept;
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      if (marked[v][i] != 0) continue;
-      kept.positions.push_back(part.positions[i]);
-      kept.normals.push_back(part.normals[i]);
+    PosedScan& scan = scans[static_cast<std::size_t>(component.members[v])];
+    ASBUILT_EXPECT(scan.taken_from.empty(), "a part of which nothing was taken");
+    PointCloud kept, taken;
+    std::vector<std::uint32_t> from;
+    for (std::size_t i = 0; i < scan.part.size(); ++i) {
+      PointCloud& to = marked[v][i] != 0 ? taken : kept;
+      to.positions.push_back(scan.part.positions[i]);
+      to.normals.push_back(scan.part.normals[i]);
+      if (marked[v][i] != 0) from.push_back(static_cast<std::uint32_t>(i));
     }
-    if (kept.empty() || kept.size() == part.size()) continue;
-    PointCloud& whole = scans[static_cast<std::size_t>(component.members[v])].whole_part;
-    if (whole.empty()) whole = std::move(part);
-    part = std::move(kept);
+    if (kept.empty() || taken.empty()) continue;
+    scan.part = std::move(kept);
+    scan.taken_out = std::move(taken);
+    scan.taken_from = std::move(from);
   }
   return {};
 }
 
 void restore_seen_through(std::vector<PosedScan>& scans) {
   for (PosedScan& scan : scans) {
-    if (!scan.whole_part.empty()) scan.part = std::exchange(scan.whole_part, {});
+    if (scan.taken_from.empty()) continue;
+    const std::size_t points = scan.part.size() + scan.taken_from.size();
+    PointCloud whole;
+    for (std::size_t kept = 0, taken = 0; kept + taken < points;) {
+      const bool was_taken = taken < scan.taken_from.size() && scan.taken_from[taken] == kept + taken;
+      const PointCloud& from = was_taken ? scan.taken_out : scan.part;
+      const std::size_t place = was_taken ? taken++ : kept++;
+      whole.positions.push_back(from.positions[place]);
+      whole.normals.push_back(from.normals[place]);
+    }
+    scan.part = std::move(whole);
+    scan.taken_out = {};
+    scan.taken_from.clear();
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -24,7 +25,8 @@ namespace asbuilt::pipeline {
 struct PosedScan {
   int index = 0;                                      ///< in the record
   PointCloud part;                                    ///< in the scan frame minus the offset
-  PointCloud whole_part;  ///< as read, where remove_seen_through has taken points out of `part`; else empty
+  PointCloud taken_out;                               ///< by remove_seen_through
+  std::vector<std::uint32_t> taken_from;              ///< where these stood in `part` as read, ascending
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
@@ -64,7 +66,7 @@ struct Contradiction {
                                                         const Options& options, const Context& context);
 
 /// Takes points out of the members' parts that other scans looked straight through under the refined poses and none
-/// measured: clutter that was cut out with the part, flying points.
+/// measured: clutter that was cut out with the part, flying points. Precondition: nothing is taken out yet.
 [[nodiscard]] Result<void> remove_seen_through(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                                const Context& context);
 

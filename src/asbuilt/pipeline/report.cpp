@@ -55,6 +55,28 @@ class ColourColumns {
   std::array<std::vector<std::uint8_t>, 3> channels_;
 };
 
+/// What the sensors saw beside the places, as columns of their own; as CloudColumns.
+class SeenColumns {
+ public:
+  explicit SeenColumns(const fuse::Reconstruction& reconstruction) : intensities_(reconstruction.intensities) {
+    for (const fuse::Colour& colour : reconstruction.colours) {
+      for (std::size_t c = 0; c < 3; ++c) channels_[c].push_back(colour[c]);
+    }
+  }
+
+  void append_to(std::vector<io::PlyColumn>& columns) const {
+    constexpr std::array<const char*, 3> kNames{"scan_red", "scan_green", "scan_blue"};
+    for (std::size_t c = 0; c < 3 && !channels_[c].empty(); ++c) {
+      columns.push_back({kNames[c], std::span<const std::uint8_t>(channels_[c])});
+    }
+    if (!intensities_.empty()) columns.push_back({"intensity", intensities_});
+  }
+
+ private:
+  std::array<std::vector<std::uint8_t>, 3> channels_;
+  std::span<const float> intensities_;
+};
+
 }  // namespace
 
 io::DeviationRecord recorded_deviation(const inspect::DeviationReport& deviations) {
@@ -78,6 +100,8 @@ Result<void> write_reconstruction(const std::filesystem::path& path, const fuse:
   columns.push_back({"deviation", deviation_mm});
   const ColourColumns coloured(deviation_mm, colours);
   coloured.append_to(columns);
+  const SeenColumns seen(reconstruction);
+  seen.append_to(columns);
   const std::vector<std::string> comments{"asbuilt reconstruction: model frame, mm; deviation positive outside"};
   return io::write_ply(path, columns, comments);
 }

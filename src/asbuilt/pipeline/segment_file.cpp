@@ -12,6 +12,8 @@
 namespace asbuilt::pipeline {
 namespace {
 
+constexpr const char* kDetected = "part_detected";
+
 /// One coordinate of all vectors, moved by `shift`.
 template <class Scalar>
 std::vector<Scalar> column(const std::vector<Eigen::Vector3f>& vectors, Eigen::Index axis, double shift = 0.0) {
@@ -73,6 +75,9 @@ Result<void> write_segment(const std::filesystem::path& path, const Segment& seg
     columns.push_back({kNormalNames[axis], std::span<const float>(normal_columns[axis])});
   }
   columns.push_back({"part", std::span<const std::uint8_t>(segment.is_part)});
+  if (!segment.was_part_detected.empty()) {
+    columns.push_back({kDetected, std::span<const std::uint8_t>(segment.was_part_detected)});
+  }
   std::array<std::vector<std::uint8_t>, 3> channels;
   constexpr std::array<const char*, 3> kChannelNames{"red", "green", "blue"};
   for (std::size_t c = 0; c < 3 && !segment.colours.empty(); ++c) {
@@ -86,7 +91,7 @@ Result<void> write_segment(const std::filesystem::path& path, const Segment& seg
   return io::write_ply(path, columns, comments);
 }
 
-Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm) {
+Result<Segment> read_segment(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm) {
   ASBUILT_TRY(vertices, io::read_ply_vertices(path));
   std::array<const std::vector<double>*, 7> columns{};
   constexpr std::array<const char*, 7> kNames{"x", "y", "z", "nx", "ny", "nz", "part"};
@@ -97,13 +102,40 @@ Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vec
                                                          "writes it",
                                                          path.string(), kNames[i]));
   }
-  PointCloud part;
-  for (std::size_t i = 0; i < columns[6]->size(); ++i) {
-    if ((*columns[6])[i] == 0.0) continue;
+  Segment segment;
+  const std::size_t points = columns[6]->size();
+  for (std::size_t i = 0; i < points; ++i) {
     const Eigen::Vector3d position((*columns[0])[i], (*columns[1])[i], (*columns[2])[i]);
     const Eigen::Vector3d normal((*columns[3])[i], (*columns[4])[i], (*columns[5])[i]);
-    part.positions.emplace_back((position - offset_mm).cast<float>());
-    part.normals.emplace_back(normal.cast<float>());
+    segment.cloud.positions.emplace_back((position - offset_mm).cast<float>());
+    segment.cloud.normals.emplace_back(normal.cast<float>());
+    segment.is_part.push_back((*columns[6])[i] != 0.0 ? 1 : 0);
+  }
+  if (const auto* detected = vertices.find(kDetected)) {
+    for (const double value : *detected) segment.was_part_detected.push_back(value != 0.0 ? 1 : 0);
+  }
+  const auto *red = vertices.find("red"), *green = vertices.find("green"), *blue = vertices.find("blue");
+  if (red != nullptr && green != nullptr && blue != nullptr) {
+    const auto channel = [](double value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)); };
+    for (std::size_t i = 0; i < points; ++i) {
+      segment.colours.push_back({channel((*red)[i]), channel((*green)[i]), channel((*blue)[i])});
+    }
+  }
+  if (const auto* intensity = vertices.find("intensity")) {
+    for (const double value : *intensity) segment.intensities.push_back(static_cast<float>(value));
+  }
+  return segment;
+}
+
+Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm) {
+  ASBUILT_TRY(segment, read_segment(path, offset_mm));
+  const std::vector<std::uint8_t>& is_part =
+      segment.was_part_detected.empty() ? segment.is_part : segment.was_part_detected;
+  PointCloud part;
+  for (std::size_t i = 0; i < is_part.size(); ++i) {
+    if (is_part[i] == 0) continue;
+    part.positions.push_back(segment.cloud.positions[i]);
+    part.normals.push_back(segment.cloud.normals[i]);
   }
   return part;
 }

@@ -20,8 +20,10 @@ namespace asbuilt::pipeline {
 struct Segment {
   PointCloud cloud;
   std::vector<std::uint8_t> is_part;  ///< one per point: 1 part, 0 margin
-  std::vector<io::Rgb> colours;       ///< empty or one per point, from the scan's file
-  std::vector<float> intensities;     ///< likewise
+  /// The same as the scan half had cut it out, where the joint half has cut it anew; else empty.
+  std::vector<std::uint8_t> was_part_detected;
+  std::vector<io::Rgb> colours;    ///< empty or one per point, from the scan's file
+  std::vector<float> intensities;  ///< likewise
 };
 
 /// Cuts segment and margin out of a scan. Where the scan's own normals have no trustworthy sign, they take that of the
@@ -34,7 +36,10 @@ struct Segment {
 [[nodiscard]] Result<void> write_segment(const std::filesystem::path& path, const Segment& segment,
                                          const Eigen::Vector3d& offset_mm);
 
-/// The part's points alone, in the scan frame minus `offset_mm`.
+/// All of a segment file, in the scan frame minus `offset_mm`. Errors: as read_part.
+[[nodiscard]] Result<Segment> read_segment(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm);
+
+/// The part's points alone, as the scan half had cut it out, in the scan frame minus `offset_mm`.
 /// Errors: unreadable_input, also when a column of ours is missing.
 [[nodiscard]] Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm);
 

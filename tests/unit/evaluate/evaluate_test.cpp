@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -234,6 +235,54 @@ TEST(Evaluate, SegmentsAreJudgedPointByPoint) {
               static_cast<double>(taken) / static_cast<double>(taken + others), 1e-12);
   EXPECT_NEAR(*evaluation.per_scan[index].segment_recall, static_cast<double>(taken) / static_cast<double>(seen),
               1e-12);
+}
+
+TEST(Evaluate, TheReconstructionIsHeldAgainstTheTrueSurface) {
+  Scenario scenario("reconstruction");
+  // True poses but for one motion of all; the cloud is the union of the part's points, and three that fly.
+  Vector6d twist;
+  twist << 0.003, -0.002, 0.004, 0.8, -0.5, 0.3;
+  const Pose motion = pose_from_twist(twist);
+  std::array<std::vector<float>, 3> columns;
+  const auto add = [&](const Eigen::Vector3d& point_in_model) {
+    const Eigen::Vector3d moved = motion * point_in_model;
+    for (Eigen::Index c = 0; c < 3; ++c) columns[static_cast<std::size_t>(c)].push_back(static_cast<float>(moved[c]));
+  };
+  for (std::size_t s = 0; s < scenario.simulation.scans.size(); ++s) {
+    const simulate::SimulatedScan& scan = scenario.simulation.scans[s];
+    if (!scan.model_from_scan) continue;
+    scenario.record.scans[s].model_from_scan = motion * *scan.model_from_scan;
+    for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+      if (scan.labels[i] == 1) add(*scan.model_from_scan * scan.points_in_scan[i].cast<double>());
+    }
+  }
+  const std::size_t points = columns[0].size();
+  EXPECT_FALSE(scenario.evaluated().value().reconstruction_beyond_share);  // there is none yet
+  const auto write = [&] {
+    std::vector<io::PlyColumn> ply;
+    for (std::size_t c = 0; c < 3; ++c) ply.push_back({std::string(1, "xyz"[c]), std::span<const float>(columns[c])});
+    std::filesystem::create_directories(scenario.folder / "result");
+    ASSERT_TRUE(io::write_ply(scenario.folder / "result" / "reconstruction.ply", ply).has_value());
+  };
+  write();
+  const Evaluation true_points = scenario.evaluated().value();
+  EXPECT_EQ(true_points.reconstruction_points, points);
+  EXPECT_EQ(*true_points.reconstruction_beyond_share, *true_points.oracle_beyond_share);
+  EXPECT_EQ(*true_points.reconstruction_completeness, 1.0);
+
+  for (int i = 1; i <= 3; ++i) add(Eigen::Vector3d(0, 0, 500.0 * i));
+  write();
+  const Evaluation flying = scenario.evaluated().value();
+  EXPECT_EQ(flying.reconstruction_points, points + 3);
+  EXPECT_EQ(flying.reconstruction_beyond, true_points.reconstruction_beyond + 3);
+  EXPECT_EQ(*flying.oracle_beyond_share, *true_points.oracle_beyond_share);
+  EXPECT_EQ(nlohmann::json::parse(to_json(flying))["reconstruction_beyond"], flying.reconstruction_beyond);
+
+  for (auto& column : columns) column.resize(points / 3);
+  write();
+  const Evaluation in_part = scenario.evaluated().value();
+  EXPECT_LT(*in_part.reconstruction_completeness, 0.95);
+  EXPECT_GT(*in_part.reconstruction_completeness, 0.1);
 }
 
 TEST(Evaluate, TwoScansOfOneNameAndForeignResultsAreErrors) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "property/fuse/plane_scans.h"
 
@@ -114,10 +115,45 @@ TEST(Fuse, EdgesStaySharp) {
     const Eigen::Vector3f& p = result.cloud.positions[i];
     const bool is_top = result.cloud.normals[i].z() > 0.7F;
     EXPECT_LT(std::abs(is_top ? p.z() : p.x()), 0.08F) << "four sigma of a single scan";
-    EXPECT_GT(result.cloud.normals[i].maxCoeff(), 0.9999F) << "no normal leans over the edge";
+    EXPECT_GT(result.cloud.normals[i].maxCoeff(), 0.999F) << "no normal leans over the edge, but for a fit's noise";
     near_edge += std::hypot(p.x(), p.z()) < 0.3F;
   }
   EXPECT_GT(near_edge, 50) << "there must be something at the edge to judge";
+}
+
+TEST(Fuse, AProfileNarrowerThanItsNormalsReachStaysWhereItIs) {
+  // A square bar along y, 4 mm wide, sampled every 2 mm by four scans; normals lean by 35 degrees towards the corners,
+  // as plane fits over more than a face do.
+  constexpr double kSigma = 0.05;
+  std::vector<PosedSegment> segments(4);
+  for (int index = 0; index < 4; ++index) {
+    PosedSegment& scan = segments[static_cast<std::size_t>(index)];
+    scan.scan_index = index;
+    scan.noise_sigma_mm = kSigma;
+    scan.spacing_mm = 2.0;
+    Random random(static_cast<std::uint64_t>(index), "bar", 0);
+    for (int side = 0; side < 4; ++side) {
+      const Eigen::AngleAxisd turn(side * 0.5 * std::numbers::pi, Eigen::Vector3d::UnitY());
+      for (int row = 0; row < 60; ++row) {
+        for (const double across : {-1.0, 1.0}) {
+          const double x = across + random.uniform(-0.6, 0.6), y = 2.0 * row + random.uniform(-0.6, 0.6);
+          const double lean = across * 35.0 * std::numbers::pi / 180.0;
+          const Eigen::Vector3d point(x, y, 2.0 + kSigma * random.normal());
+          const Eigen::Vector3d normal(std::sin(lean), 0.0, std::cos(lean));
+          scan.segment_in_scan.positions.push_back((turn * point).cast<float>());
+          scan.segment_in_scan.normals.push_back((turn * normal).cast<float>());
+        }
+      }
+    }
+  }
+  const Reconstruction result = fuse::fuse(segments, {}, Context(2)).value();
+  double squares = 0.0;
+  for (const Eigen::Vector3f& p : result.cloud.positions) {
+    const double off = std::max(std::abs(p.x()), std::abs(p.z())) - 2.0;
+    EXPECT_LT(std::abs(off), 6.0 * kSigma);
+    squares += off * off;
+  }
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(result.cloud.size())), 1.2 * kSigma);  // kSigma without merging
 }
 
 TEST(Fuse, ACurvedSurfaceIsNotPulledInside) {
@@ -137,6 +173,44 @@ TEST(Fuse, ACurvedSurfaceIsNotPulledInside) {
   }
   const Reconstruction result = fuse::fuse(segments, {}, Context(2)).value();
   for (const auto& point : result.cloud.positions) EXPECT_NEAR(point.norm(), 5.0F, 1e-3F);
+}
+
+TEST(Fuse, ColourAndIntensityAreMeansByPrecision) {
+  // The second scan is half as noisy, so it weighs four times as much; the third knows of neither.
+  std::vector<PosedSegment> segments{scan_of({0.0, 20.0}, 0.5, 0.04, 0, 9), scan_of({0.0, 20.0}, 0.5, 0.02, 1, 9),
+                                     scan_of({30.0, 50.0}, 0.5, 0.02, 2, 9)};
+  segments[0].colours.assign(segments[0].segment_in_scan.size(), {200, 0, 50});
+  segments[0].intensities.assign(segments[0].segment_in_scan.size(), 1.0F);
+  segments[1].colours.assign(segments[1].segment_in_scan.size(), {100, 0, 150});
+  segments[1].intensities.assign(segments[1].segment_in_scan.size(), 6.0F);
+  const Reconstruction result = fuse::fuse(segments, {}, Context(2)).value();
+  ASSERT_EQ(result.colours.size(), result.cloud.size());
+  ASSERT_EQ(result.intensities.size(), result.cloud.size());
+  double intensity = 0.0, red = 0.0, places = 0.0;
+  for (std::size_t i = 0; i < result.cloud.size(); ++i) {
+    const float x = result.cloud.positions[i].x();
+    if (x > 25.0F) {
+      EXPECT_EQ(result.colours[i], (Colour{0, 0, 0}));
+      EXPECT_TRUE(std::isnan(result.intensities[i]));
+      continue;
+    }
+    EXPECT_EQ(result.colours[i][1], 0);
+    if (x < 2.0F || x > 18.0F) continue;  // at the rims the numbers of samples of both differ
+    intensity += static_cast<double>(result.intensities[i]);
+    red += result.colours[i][0];
+    places += 1.0;
+  }
+  // Both have as many samples anywhere: (1 + 4 * 6) / 5 and (200 + 4 * 100) / 5.
+  EXPECT_NEAR(intensity / places, 5.0, 0.1);
+  EXPECT_NEAR(red / places, 120.0, 2.0);
+
+  FuseOptions union_only;
+  union_only.paper_mode = true;
+  const Reconstruction all = fuse::fuse(segments, union_only, Context(2)).value();
+  EXPECT_EQ(std::ranges::count(all.colours, Colour{200, 0, 50}),
+            static_cast<std::ptrdiff_t>(segments[0].segment_in_scan.size()));
+  segments[0].colours.pop_back();
+  EXPECT_EQ(fuse::fuse(segments, {}, Context(1)).error().code, ErrorCode::invalid_argument);
 }
 
 TEST(Fuse, OnlyClearlyIsolatedPointsAreLeftOut) {

@@ -30,6 +30,25 @@ TEST(Segment, GivesBackThePartWithoutTheMargin) {
   EXPECT_EQ(part->normals, (std::vector{written.cloud.normals[0], written.cloud.normals[2]}));
 }
 
+TEST(Segment, CutAnewKeepsTheFlagsOfTheScanHalfAndWhatTheSensorSaw) {
+  const auto path = temporary("recut_segment.ply");
+  Segment written = three_points();
+  written.was_part_detected = {1, 1, 0};
+  written.colours = {{1, 2, 3}, {4, 5, 6}, {255, 0, 128}};
+  written.intensities = {0.5F, 0.25F, 7.0F};
+  ASSERT_TRUE(write_segment(path, written, Eigen::Vector3d::Zero()).has_value());
+  const auto read = read_segment(path, Eigen::Vector3d::Zero());
+  ASSERT_TRUE(read.has_value()) << read.error().message;
+  EXPECT_EQ(read->cloud.positions, written.cloud.positions);
+  EXPECT_EQ(read->is_part, written.is_part);
+  EXPECT_EQ(read->was_part_detected, written.was_part_detected);
+  EXPECT_EQ(read->colours, written.colours);
+  EXPECT_EQ(read->intensities, written.intensities);
+  // The joint half begins with what the scan half had cut out.
+  EXPECT_EQ(read_part(path, Eigen::Vector3d::Zero())->positions,
+            (std::vector{written.cloud.positions[0], written.cloud.positions[1]}));
+}
+
 TEST(Segment, FarFromTheOriginIsWrittenInTheFilesCoordinatesWithoutLoss) {
   const auto path = temporary("far_segment.ply");
   const Eigen::Vector3d offset(4.5e9, -3.2e9, 1.0e6);  // a national grid in mm
