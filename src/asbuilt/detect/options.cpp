@@ -21,7 +21,7 @@ Result<void> DetectOptions::validate() const {
   ASBUILT_CHECK(expect_between("reference_points", reference_points, 1, 1000000));
   ASBUILT_CHECK(expect_between("max_hypotheses", max_hypotheses, 1, 100000));
   ASBUILT_CHECK(expect_between("last_reference_points", last_reference_points, 0, 1000000));
-  ASBUILT_CHECK(expect_between("most_votes", most_votes, 0.0, 1e15));
+  ASBUILT_CHECK(expect_between("most_million_votes", most_million_votes, 0.0, 1e6));
   ASBUILT_CHECK(expect_between("last_hypotheses", last_hypotheses, 1, 100000));
   ASBUILT_CHECK(expect_between("peaks_per_reference", peaks_per_reference, 1, 100));
   ASBUILT_CHECK(expect_between("peak_ratio", peak_ratio, 0.0, 1.0));

@@ -18,7 +18,7 @@ struct DetectOptions {
   int reference_points = 1000;           ///< scene reference points; paper: 400-1000
   int max_hypotheses = 200;              ///< clusters handed to verification; paper: some 50
   int last_reference_points = 5000;      ///< scene reference points of a last look; 0: none is taken
-  double most_votes = 1.5e9;             ///< the last look ends when so many have been cast
+  double most_million_votes = 1500.0;    ///< the last look ends when so many have been cast
   int last_hypotheses = 400;             ///< clusters of the last look that are verified
   double cluster_angle_deg = 15.0;       ///< poses closer than this in rotation ...
   double cluster_distance_ratio = 0.06;  ///< ... and than this share of the diameter at the model's centre are one
@@ -58,7 +58,8 @@ void for_each_field(DetectOptions& options, Visitor&& field) {
   field("max_hypotheses", options.max_hypotheses, "pose clusters handed to verification");
   field("last_reference_points", options.last_reference_points,
         "scene reference points of a last look, taken where the part was not found (0: none)");
-  field("most_votes", options.most_votes, "votes of one scan after which the last look lets no more points vote");
+  field("most_million_votes", options.most_million_votes,
+        "millions of votes of one scan after which the last look lets no more points vote");
   field("last_hypotheses", options.last_hypotheses, "pose clusters of the last look that are verified");
   field("cluster_angle_deg", options.cluster_angle_deg, "rotation within which hypotheses are one pose");
   field("cluster_distance_ratio", options.cluster_distance_ratio, "distance / diameter within which they are");

@@ -88,9 +88,10 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
   }
   // In a hall, hardly any of the reference points so far need lie on the part.
   const int last = std::min(options.detect.last_reference_points, static_cast<int>(search->most_reference_points()));
-  const bool may_go_on = static_cast<double>(search->votes_cast()) < options.detect.most_votes;
+  const double most_votes = 1e6 * options.detect.most_million_votes;
+  const bool may_go_on = static_cast<double>(search->votes_cast()) < most_votes;
   if (detection->status == verify::Status::rejected && last > all && may_go_on) {
-    ASBUILT_CHECK(propose(last, options.detect.most_votes, options.detect.last_hypotheses));
+    ASBUILT_CHECK(propose(last, most_votes, options.detect.last_hypotheses));
     add_candidates(*detection, found.hypotheses);
     judge_all(verify::Look::patient);
     if (!detection) return tl::unexpected(detection.error());

@@ -70,7 +70,7 @@ TEST(FindPart, LooksOnceMoreWhereItFoundNothing) {
   EXPECT_EQ(with.looks, 2);
   EXPECT_GT(with.votes_cast, without.votes_cast);
 
-  few.detect.most_votes = 1.0;  // the first look has cast more
+  few.detect.most_million_votes = 1e-6;  // the first look has cast more
   EXPECT_EQ(scene().found(few).looks, 1);
 }
 
