@@ -8,7 +8,13 @@ live = subprocess.Popen(
      "--idle", "3600"],
     stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 states = map(json.loads, live.stdout)
-first_times, final_times = [], []
+first_times, final_times, cpu_times = [], [], []
+
+
+def cpu_seconds():  # of the session, all threads: what says something on a machine that has other things to do, too
+    with open(f"/proc/{live.pid}/stat") as stat:
+        user, system = stat.read().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
 def wait(wanted):
@@ -21,15 +27,17 @@ def wait(wanted):
 wait(lambda state: state["watch"])
 for name in sorted(n for n in os.listdir(scenes) if n.startswith("scan_") and n.endswith(".ply")):
     shutil.copy(f"{scenes}/{name}", f"{watched}/.coming")
-    begin = time.monotonic()
+    begin, cpu_begin = time.monotonic(), cpu_seconds()
     os.rename(f"{watched}/.coming", f"{watched}/{name}")
     told, state = wait(lambda state: any(s["file"] == name for s in state["scans"]))
     first_times.append(told - begin)
     if any(s["file"] == name and s["provisional"] for s in state["scans"]):
         told, state = wait(lambda state: any(s["file"] == name and not s["provisional"] for s in state["scans"]))
     final_times.append(told - begin)
+    cpu_times.append(cpu_seconds() - cpu_begin)
     time.sleep(0.5)  # the sensor's limits are learnt after the answer
 live.kill()
 load = os.getloadavg()[0]
 print(f"{points} points: told after {statistics.median(first_times):.2f} s, confirmed after "
-      f"{statistics.median(final_times):.2f} s (median of {len(first_times)}, load {load:.1f})")
+      f"{statistics.median(final_times):.2f} s, {statistics.median(cpu_times):.2f} s of CPU "
+      f"(median of {len(first_times)}, load {load:.1f})")
