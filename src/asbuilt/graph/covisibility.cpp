@@ -11,21 +11,18 @@ namespace asbuilt::graph {
 namespace {
 
 constexpr float kMinCosine = 0.70710678F;  // 45 degrees
+// 20 bits an axis (a hundred diameters at the smallest voxel ratio allowed) leave the top four for the side.
+constexpr int kBias = 1 << 19;
+constexpr VoxelKey kAxisMask = 0xfffffU;
 
-// 0..5: the axis direction next to the normal.
-VoxelKey side_of(const Eigen::Vector3f& normal) {
+int side_of(const Eigen::Vector3f& normal) {
   Eigen::Index axis = 0;
   normal.cwiseAbs().maxCoeff(&axis);
-  return static_cast<VoxelKey>(2 * axis + (normal[axis] < 0.0F ? 1 : 0));
+  return static_cast<int>(2 * axis + (normal[axis] < 0.0F ? 1 : 0));
 }
 
-// 20 bits an axis (a hundred diameters at the smallest voxel ratio allowed) leave the top four for the side.
 VoxelKey cell_key(const CovisibilityGrid& grid, const Eigen::Vector3f& point, const Eigen::Vector3f& normal) {
-  const Eigen::Vector3i cell = grid.voxels.cell(point.cast<double>());
-  constexpr int kBias = 1 << 19;
-  const auto part = [](int value) { return static_cast<VoxelKey>(value + kBias) & 0xfffffU; };
-  const VoxelKey side = grid.by_side ? side_of(normal) : 0;
-  return (side << 60) | (part(cell.z()) << 40) | (part(cell.y()) << 20) | part(cell.x());
+  return key_of({grid.voxels.cell(point.cast<double>()), grid.by_side ? side_of(normal) : 0});
 }
 
 PointCloud transformed(const PointCloud& cloud, const Pose& pose, const Context& context) {
@@ -65,6 +62,17 @@ std::vector<char> visible_samples(const PointCloud& observed, const PointCloud& 
 }
 
 }  // namespace
+
+VoxelKey key_of(const Cell& cell) {
+  const auto part = [](int value) { return static_cast<VoxelKey>(value + kBias) & kAxisMask; };
+  return (static_cast<VoxelKey>(cell.side) << 60) | (part(cell.voxel.z()) << 40) | (part(cell.voxel.y()) << 20) |
+         part(cell.voxel.x());
+}
+
+Cell cell_of(VoxelKey key) {
+  const auto part = [&](int shift) { return static_cast<int>((key >> shift) & kAxisMask) - kBias; };
+  return {Eigen::Vector3i(part(0), part(20), part(40)), static_cast<int>(key >> 60)};
+}
 
 std::vector<VoxelKey> visible_cells(const PointCloud& segment_in_scan, const Pose& model_from_scan,
                                     const PointCloud& model_samples, const CovisibilityGrid& grid,

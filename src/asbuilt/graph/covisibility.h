@@ -18,6 +18,14 @@ struct CovisibilityGrid {
   bool by_side = true;
 };
 
+/// What a cell's key says.
+struct Cell {
+  Eigen::Vector3i voxel = Eigen::Vector3i::Zero();
+  int side = 0;  ///< 0..5: +x, -x, +y, -y, +z, -z, next to the normal; 0 where sides are not told apart
+};
+[[nodiscard]] VoxelKey key_of(const Cell& cell);
+[[nodiscard]] Cell cell_of(VoxelKey key);
+
 /// Share of a voxel's edge within which an observed point makes a model sample visible.
 inline constexpr double kVisibleReach = 1.5;
 

@@ -4,7 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "asbuilt/core/disjoint_sets.h"
 
@@ -13,6 +17,7 @@ namespace {
 
 bool is_valid(const PairOverlap& pair, int scan_count) {
   const bool scans_exist = 0 <= pair.first && pair.first < pair.second && pair.second < scan_count;
+  if (std::isnan(pair.firmness)) return false;
   return scans_exist && 0.0 <= pair.overlap && pair.overlap <= 1.0;  // NaN fails here, as it should
 }
 
@@ -32,24 +37,34 @@ Result<void> check(int scan_count, std::span<const PairOverlap> overlaps) {
   return {};
 }
 
-// Which of the strong pairs (a prefix of the ranking) stay under the cap. Those of the maximum spanning forest always
-// do, so the cap thins the graph but never cuts it.
+// Which of the strong pairs stay under the cap: one forest after the other, each from the firmest pairs that are left.
 std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong, int max_degree) {
   std::vector<bool> kept(strong.size(), max_degree == 0);
   if (max_degree == 0) return kept;
-  DisjointSets forest(scan_count);
+  std::vector<std::size_t> waiting(strong.size());
+  std::iota(waiting.begin(), waiting.end(), std::size_t{0});
+  std::ranges::stable_sort(waiting, std::ranges::greater{}, [&](std::size_t i) { return strong[i].firmness; });
+
   std::vector<int> degree(static_cast<std::size_t>(scan_count), 0);
   const auto degree_of = [&](int scan) -> int& { return degree[static_cast<std::size_t>(scan)]; };
-  const auto keep = [&](std::size_t i) {
-    kept[i] = true;
-    ++degree_of(strong[i].first);
-    ++degree_of(strong[i].second);
+  const auto has_room = [&](const PairOverlap& pair) {
+    return degree_of(pair.first) < max_degree && degree_of(pair.second) < max_degree;
   };
-  for (std::size_t i = 0; i < strong.size(); ++i) {
-    if (forest.unite(strong[i].first, strong[i].second)) keep(i);
-  }
-  for (std::size_t i = 0; i < strong.size(); ++i) {
-    if (!kept[i] && degree_of(strong[i].first) < max_degree && degree_of(strong[i].second) < max_degree) keep(i);
+  for (bool first = true; !waiting.empty(); first = false) {
+    DisjointSets forest(scan_count);
+    std::vector<std::size_t> left;
+    for (const std::size_t i : waiting) {
+      const PairOverlap& pair = strong[i];
+      if (!first && !has_room(pair)) continue;  // room never comes back
+      if (!forest.unite(pair.first, pair.second)) {
+        left.push_back(i);
+        continue;
+      }
+      kept[i] = true;
+      ++degree_of(pair.first);
+      ++degree_of(pair.second);
+    }
+    waiting = std::move(left);
   }
   return kept;
 }

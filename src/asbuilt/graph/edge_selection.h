@@ -12,6 +12,7 @@ namespace asbuilt::graph {
 struct PairOverlap {
   int first = 0, second = 0;  ///< scan indices, first < second
   double overlap = 0.0;       ///< shared voxels / voxels of the scan that has fewer, in [0, 1]
+  double firmness = 0.0;      ///< shared voxels that hold the motion held least (SharedCells::firmness); 0: unknown
 
   bool operator==(const PairOverlap&) const = default;
 };
@@ -19,7 +20,7 @@ struct PairOverlap {
 struct EdgeSelectionOptions {
   double low = 0.05;         ///< alpha_l: a pair below it is never linked (our value; the paper gives none)
   double high = 0.10;        ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
-  int max_degree = 0;        ///< strong links a scan keeps in dense networks, highest overlap first; 0: all of them
+  int max_degree = 0;        ///< strong links a scan keeps in dense networks, firmest first; 0: all of them
   bool bridges_only = true;  ///< below `high` only a pair that joins two components; paper: any, until connected
 
   [[nodiscard]] Result<void> validate() const;  ///< 0 <= low <= high <= 1, max_degree >= 0
@@ -41,10 +42,12 @@ struct EdgeSelection {
 ///
 /// Pairs at or above `high` are linked at once. While the graph is still in pieces, further pairs follow in
 /// decreasing order, down to `low`: each that joins two components, or (paper: `bridges_only` off) each at all.
-/// Scans that stay alone form components of their own. With `max_degree`, a strong pair is left out when one of its
-/// scans has enough links already and the pair is not needed to connect: the components never depend on the cap.
+/// Scans that stay alone form components of their own. With `max_degree`, one spanning forest of strong pairs after the
+/// other is taken, firmest pairs first (ties by overlap, then by index), as long as both scans of a pair have room. The
+/// first forest takes no notice of the cap, so components never depend on it; the next ones make that no few links
+/// carry the whole, which the firmest pairs alone, near twins all, would not.
 ///
-/// Source: Sec. 3.2, Fig. 4 (c) and (d). Cost: O(P log P) for P pairs.
+/// Source: Sec. 3.2, Fig. 4 (c) and (d). Cost: O(P (log P + max_degree)) for P pairs.
 /// Errors: invalid_argument if the options fail validate(), or a pair names an unknown scan, comes twice or has no
 /// overlap in [0, 1].
 [[nodiscard]] Result<EdgeSelection> select_edges(int scan_count, std::span<const PairOverlap> overlaps,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -29,7 +30,8 @@ class OverlapHistogram {
  private:
   struct Shared {
     int first, second;
-    std::size_t cells;
+    std::int64_t cells;
+    double firmness;
   };
   std::unordered_map<VoxelKey, std::vector<int>> seen_by_;  // looked up only, never iterated
   std::vector<std::size_t> cell_count_;

@@ -51,16 +51,20 @@ void look(const Eye& eye, const scan::Viewpoint& viewpoint, const PointCloud& po
   }
 }
 
-// All that is said of a view over its links, those to `without` left out.
-LinkEvidence pooled(int view, int without, std::span<const LinkEvidence> evidence) {
-  LinkEvidence sum{view, view};
+void add(LinkEvidence& sum, const LinkEvidence& link) {
+  sum.agreeing += link.agreeing;
+  sum.contradicting += link.contradicting;
+}
+
+// All that is said of each view over its links, those to `without` (-1: nobody) left out.
+std::vector<LinkEvidence> pooled(int view_count, int without, std::span<const LinkEvidence> evidence) {
+  std::vector<LinkEvidence> sums(static_cast<std::size_t>(view_count));
   for (const LinkEvidence& link : evidence) {
-    if (link.first != view && link.second != view) continue;
     if (link.first == without || link.second == without) continue;
-    sum.agreeing += link.agreeing;
-    sum.contradicting += link.contradicting;
+    add(sums[static_cast<std::size_t>(link.first)], link);
+    add(sums[static_cast<std::size_t>(link.second)], link);
   }
-  return sum;
+  return sums;
 }
 
 int largest_group_without(int view, int view_count, std::span<const LinkEvidence> evidence) {
@@ -123,12 +127,14 @@ Result<std::vector<std::vector<char>>> seen_through(std::span<const View> views,
 
 std::optional<ContradictedView> contradicted_view(int view_count, std::span<const LinkEvidence> evidence) {
   std::optional<ContradictedView> worst;
+  const std::vector<LinkEvidence> all = pooled(view_count, -1, evidence);
   for (int view = 0; view < view_count; ++view) {
-    const LinkEvidence own = pooled(view, -1, evidence);
-    if (own.contradicting < kFewest) continue;
+    const LinkEvidence own = all[static_cast<std::size_t>(view)];
+    if (own.contradicting < kFewest || own.share() <= kMoreThanUsual) continue;  // whatever is usual
+    const std::vector<LinkEvidence> rest = pooled(view_count, view, evidence);
     std::vector<double> others;
     for (int other = 0; other < view_count; ++other) {
-      const LinkEvidence theirs = pooled(other, view, evidence);
+      const LinkEvidence& theirs = rest[static_cast<std::size_t>(other)];
       if (other != view && theirs.agreeing > 0) others.push_back(theirs.share());
     }
     if (static_cast<int>(others.size()) < kMinOthers) continue;

@@ -136,33 +136,38 @@ double total_cost(std::span<const DirectedEdge> edges, std::span<const SampledVi
   });
 }
 
+LocalInformation local_information(const EdgeSums& both_ways, const Scaling& scaling) {
+  LocalInformation local;
+  if (!(both_ways.weight > 0.0)) return local;
+  local.centre = both_ways.weighted_position / both_ways.weight;
+  const double variance = both_ways.weighted_square_position / both_ways.weight - local.centre.squaredNorm();
+  const double radius = std::sqrt(std::max(variance, 0.0));
+  if (!(radius > 1e-9 * scaling.length_mm)) return local;
+  local.radius_mm = radius;
+  local.scaled_from_local.topLeftCorner<3, 3>() *= scaling.length_mm / radius;
+  local.scaled_from_local.bottomLeftCorner<3, 3>() = cross_matrix(local.centre) / radius;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(local.scaled_from_local.transpose() * both_ways.information *
+                                                      local.scaled_from_local / both_ways.weight);
+  local.held = eigen.eigenvalues();
+  local.motions = eigen.eigenvectors();
+  return local;
+}
+
 LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling, double threshold) {
   LinkBlock held = link;
   held.information.setZero();
   held.gradient.setZero();
-  if (!(both_ways.weight > 0.0)) return held;
-
-  const Eigen::Vector3d centre = both_ways.weighted_position / both_ways.weight;
-  const double variance = both_ways.weighted_square_position / both_ways.weight - centre.squaredNorm();
-  const double radius = std::sqrt(std::max(variance, 0.0));
-  if (!(radius > 1e-9 * scaling.length_mm)) return held;  // a single point holds nothing worth having
-
-  // Scaled twists about the overlap's own centre, in units of its own size.
-  Matrix6d scaled_from_local = Matrix6d::Identity();
-  scaled_from_local.topLeftCorner<3, 3>() *= scaling.length_mm / radius;
-  scaled_from_local.bottomLeftCorner<3, 3>() = cross_matrix(centre) / radius;
-  const Matrix6d local = scaled_from_local.transpose() * link.information * scaled_from_local / both_ways.weight;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(local);
-  if (eigen.eigenvalues()[0] >= threshold) return link;
+  const LocalInformation local = local_information(both_ways, scaling);
+  if (!(local.radius_mm > 0.0)) return held;  // a single point holds nothing worth having
+  if (local.held[0] >= threshold) return link;
 
   Matrix6d projector = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    if (eigen.eigenvalues()[i] < threshold) continue;
-    projector += eigen.eigenvectors().col(i) * eigen.eigenvectors().col(i).transpose();
+    if (local.held[i] < threshold) continue;
+    projector += local.motions.col(i) * local.motions.col(i).transpose();
   }
-  const Matrix6d local_from_scaled = scaled_from_local.inverse();
-  const Matrix6d kept =
-      scaled_from_local * projector * local_from_scaled;  // of twists; its transpose acts on gradients
+  // Of twists; its transpose acts on gradients.
+  const Matrix6d kept = local.scaled_from_local * projector * local.scaled_from_local.inverse();
   held.gradient = kept.transpose() * link.gradient;
   held.information = kept.transpose() * link.information * kept;
   return held;

@@ -53,6 +53,16 @@ struct LinkBlock {
   double weight = 0.0;
 };
 
+/// The information of a link in its overlap's own centre and size, per match.
+struct LocalInformation {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< from the scaling's origin
+  double radius_mm = 0.0;                            ///< 0: no matches, or all in one place; the rest is then zero
+  Vector6d held = Vector6d::Zero();                  ///< eigenvalues, ascending
+  Matrix6d motions = Matrix6d::Zero();               ///< their vectors (radius * rotation, translation of the centre)
+  Matrix6d scaled_from_local = Matrix6d::Identity();
+};
+[[nodiscard]] LocalInformation local_information(const EdgeSums& both_ways, const Scaling& scaling);
+
 /// Removes from a link what it does not hold: directions whose information, in the overlap's own centre and size, is
 /// below `threshold` of what a fully constraining pair gives. Two noisy planes seem to hold the slide along each other
 /// through the noise of their normals; so does a cylinder its turn, by the curvature between matched samples. With the

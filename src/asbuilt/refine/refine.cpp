@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -239,17 +240,25 @@ class JointRefinement {
     return count > 0.0 ? std::sqrt(squares / count) : 0.0;
   }
 
+  [[nodiscard]] EdgeSums both_ways(std::size_t link, std::span<const EdgeSums> sums) const {
+    EdgeSums both = sums[2 * link];
+    both += sums[2 * link + 1];
+    return both;
+  }
+
+  // Information of a link below this is what the noise of normals feigns.
+  [[nodiscard]] double held_threshold(std::size_t link) const {
+    const double spread = std::max(edges_[2 * link].normal_spread, edges_[2 * link + 1].normal_spread);
+    return std::clamp(kHeldInSpreads * squared(spread), kMinHeld, kMaxHeld);
+  }
+
   [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums) const {
     std::vector<LinkBlock> blocks;
     for (std::size_t l = 0; l < links_.size(); ++l) {
-      const EdgeSums &there = sums[2 * l], &back = sums[2 * l + 1];
-      EdgeSums both = there;
-      both += back;
-      const LinkBlock block{links_[l].first, links_[l].second, both.information, there.gradient - back.gradient,
-                            both.weight};
-      const double spread = std::max(edges_[2 * l].normal_spread, edges_[2 * l + 1].normal_spread);
-      const double threshold = std::clamp(kHeldInSpreads * squared(spread), kMinHeld, kMaxHeld);
-      blocks.push_back(options_.drop_unheld ? held_part(block, both, scaling_, threshold) : block);
+      const EdgeSums both = both_ways(l, sums);
+      const LinkBlock block{links_[l].first, links_[l].second, both.information,
+                            sums[2 * l].gradient - sums[2 * l + 1].gradient, both.weight};
+      blocks.push_back(options_.drop_unheld ? held_part(block, both, scaling_, held_threshold(l)) : block);
     }
     return {static_cast<int>(views_.size()), fixed_, blocks};
   }
@@ -352,7 +361,34 @@ class JointRefinement {
     }
     const std::vector<EdgeSums> plain = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
     describe_uncertainty(normal_equations(plain), plain, unit_variance(plain), result);
+    for (std::size_t l = 0; l < links_.size(); ++l) result.link_holds.push_back(hold_of_link(l, both_ways(l, plain)));
     return {};
+  }
+
+  [[nodiscard]] LinkHold hold_of_link(std::size_t link, const EdgeSums& both) const {
+    const LocalInformation local = local_information(both, scaling_);
+    LinkHold hold{links_[link].first, links_[link].second, local.held, held_threshold(link), {}};
+    const Eigen::Index free = (local.held.array() < hold.threshold).count();
+    if (local.radius_mm > 0.0) {
+      hold.free = slides_and_turns(local.motions.leftCols(free), scaling_.origin + local.centre, local.radius_mm);
+    }
+    return hold;
+  }
+
+  // The same covariance, in mm of the view's own points; `unheld` holds scaled twists.
+  [[nodiscard]] ViewHold hold_of_view(std::size_t v, const Matrix6d& scaled_covariance,
+                                      const Eigen::Matrix<double, 6, Eigen::Dynamic>& unheld) const {
+    const Eigen::Vector3d centre = poses_[v] * views_[v].centroid;
+    Matrix6d local_from_scaled = Matrix6d::Identity();
+    local_from_scaled.topLeftCorner<3, 3>() *= views_[v].radius_mm / scaling_.length_mm;
+    local_from_scaled.bottomLeftCorner<3, 3>() = -cross_matrix(centre - scaling_.origin) / scaling_.length_mm;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> basis = local_from_scaled * unheld;
+    if (basis.cols() > 0) {
+      const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
+      basis = Eigen::MatrixXd(qr.householderQ()).leftCols(basis.cols());
+    }
+    return view_hold(local_from_scaled * scaled_covariance * local_from_scaled.transpose(), basis, centre,
+                     views_[v].radius_mm, usual_scale_, diameter_);
   }
 
   void describe_uncertainty(const NormalEquations& equations, std::span<const EdgeSums> sums, double variance,
@@ -362,10 +398,12 @@ class JointRefinement {
     for (std::size_t v = 0; v < views_.size(); ++v) {
       if (static_cast<int>(v) == fixed_) {
         result.covariance.push_back(Matrix6d::Zero());
+        result.view_holds.emplace_back();
         continue;
       }
       const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(inverse[v]);
       Vector6d variances = Vector6d::Zero();
+      const Eigen::Index free = (eigen.eigenvalues().array() > equations.unheld_variance()).count();
       for (int i = 0; i < 6; ++i) {
         const bool unheld = eigen.eigenvalues()[i] > equations.unheld_variance();
         const double unknown = squared(diameter_);
@@ -374,6 +412,7 @@ class JointRefinement {
       }
       const Matrix6d scaled = eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose();
       result.covariance.push_back(twist_from_scaled * scaled * twist_from_scaled.transpose());
+      result.view_holds.push_back(hold_of_view(v, scaled, eigen.eigenvectors().rightCols(free)));
     }
   }
 

@@ -8,6 +8,7 @@
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/pose.h"
 #include "asbuilt/core/result.h"
+#include "asbuilt/refine/hold.h"
 #include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::refine {
@@ -96,6 +97,8 @@ struct Refinement {
   double rms_before_mm = 0.0, rms_after_mm = 0.0;  ///< weighted point-to-plane residual over all edges
   std::vector<EdgeResidual> edges;                 ///< two per link, in the order of the links
   std::vector<UnheldDirection> unheld;             ///< reported and not moved
+  std::vector<LinkHold> link_holds;                ///< one a link, in the order of the links
+  std::vector<ViewHold> view_holds;                ///< one a view; empty without links
 };
 
 /// Minimises Eq. 5 over all poses of one component at once; the CAD does not enter.

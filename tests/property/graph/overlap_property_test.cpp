@@ -67,7 +67,7 @@ TEST(OverlapProperty, OnlineInAnyOrderEqualsBatch) {
     std::vector<PairOverlap> relabelled = builder.graph().overlaps;
     for (PairOverlap& pair : relabelled) {
       const int a = order[static_cast<std::size_t>(pair.first)], b = order[static_cast<std::size_t>(pair.second)];
-      pair = {std::min(a, b), std::max(a, b), pair.overlap};
+      pair = {std::min(a, b), std::max(a, b), pair.overlap, pair.firmness};
     }
     std::ranges::sort(relabelled, comes_before);
     EXPECT_EQ(relabelled, batch.overlaps) << "seed " << seed;

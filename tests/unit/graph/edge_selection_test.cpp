@@ -53,6 +53,31 @@ TEST(EdgeSelection, ScansWithoutLinksFormComponentsOfTheirOwn) {
   EXPECT_THAT(selection.components, ElementsAre(ElementsAre(1, 3), ElementsAre(0), ElementsAre(2)));
 }
 
+TEST(EdgeSelection, UnderTheCapTheFirmestPairStaysNotTheOneThatOverlapsMost) {
+  // A ring of four that needs three links; at a cap of one nothing follows the forest of the firmest.
+  const std::vector<PairOverlap> overlaps{{0, 1, 0.9, 0.0}, {1, 2, 0.8, 5.0}, {2, 3, 0.7, 6.0}, {0, 3, 0.6, 7.0}};
+  EdgeSelectionOptions options;
+  options.max_degree = 1;
+  EXPECT_THAT(select_edges(4, overlaps, options).value().edges, ElementsAre(overlaps[1], overlaps[2], overlaps[3]));
+}
+
+TEST(EdgeSelection, UnderTheCapTwoCrowdsAreTiedByMoreThanOneLink) {
+  // Two crowds of six near twins; the pairs across are less firm than any within.
+  std::vector<PairOverlap> overlaps;
+  for (int a = 0; a < 12; ++a) {
+    for (int b = a + 1; b < 12; ++b) {
+      const bool across = a < 6 && b >= 6;
+      overlaps.push_back({a, b, across ? 0.3 : 0.9, across ? 2.0 : 9.0});
+    }
+  }
+  EdgeSelectionOptions options;
+  options.max_degree = 5;
+  const EdgeSelection selection = select_edges(12, overlaps, options).value();
+  EXPECT_LE(selection.edges.size(), 12U * 5U / 2U + 11U);
+  const auto across = std::ranges::count_if(selection.edges, [](const PairOverlap& p) { return p.overlap < 0.5; });
+  EXPECT_GE(across, 2);
+}
+
 TEST(EdgeSelection, NothingGivesNothing) {
   const EdgeSelection selection = select_edges(0, {}).value();
   EXPECT_THAT(selection.edges, IsEmpty());

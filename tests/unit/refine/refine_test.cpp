@@ -64,6 +64,59 @@ TEST(Refine, TwoViewsOfAPlaneReportTheirThreeFreeDirectionsAndStay) {
   }
 }
 
+// Of a link that holds what an ideal surface holds: what is free, and what is not.
+void expect_three_free(const LinkHold& hold) {
+  EXPECT_EQ((hold.held.array() < hold.threshold).count(), 3) << hold.held.transpose();
+  ASSERT_EQ(hold.free.size(), 3U);
+}
+
+TEST(Refine, ALinkOfPlanesIsSaidToSlideTwiceAndToTurnAboutItsNormal) {
+  const std::vector<View> views = two_planes(0.05, 0.02);
+  const Refinement result = refine::refine(views, std::vector<Link>{{0, 1}}, {}, Context(2)).value();
+  ASSERT_EQ(result.link_holds.size(), 1U);
+  expect_three_free(result.link_holds[0]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Motion& motion = result.link_holds[0].free[i];
+    EXPECT_EQ(motion.is_turn, i == 2);
+    EXPECT_NEAR(std::abs(motion.direction.z()), i == 2 ? 1.0 : 0.0, 0.05);
+  }
+  ASSERT_EQ(result.view_holds.size(), 2U);
+  EXPECT_TRUE(result.view_holds[0].loose.empty()) << "the fixed view";
+  const ViewHold& hold = result.view_holds[1];
+  ASSERT_EQ(hold.loose.size(), 3U);
+  for (const LooseMotion& loose : hold.loose) EXPECT_TRUE(loose.unheld);
+  // The plane's height is the mean of its points: sigma / sqrt(number) within what both ways and two clouds make of it.
+  EXPECT_GT(hold.sigma_mm[2], 50.0);
+  EXPECT_LT(hold.sigma_mm[3], 0.05);
+  EXPECT_GT(hold.sigma_mm[5], 0.0);
+}
+
+TEST(Refine, ALinkOfTwoWallsIsSaidToSlideAlongTheirEdge) {
+  // An angle profile along (1, 2, 2) / 3: two planes that meet there.
+  const Eigen::Vector3d along = Eigen::Vector3d(1, 2, 2) / 3.0, up = Eigen::Vector3d(2, 1, -2) / 3.0,
+                        side = along.cross(up);
+  std::vector<View> views(2);
+  for (std::size_t v = 0; v < 2; ++v) {
+    Random random(3, "angle", v);
+    for (int i = 0; i < 6000; ++i) {
+      const Eigen::Vector3d normal = i % 2 == 0 ? up : side, other = i % 2 == 0 ? side : up;
+      const Eigen::Vector3d point =
+          random.uniform(0.0, 100.0) * along + random.uniform(1.0, 40.0) * other + 0.02 * random.normal() * normal;
+      views[v].segment_in_scan.positions.push_back(point.cast<float>());
+      views[v].segment_in_scan.normals.push_back(normal.cast<float>());
+    }
+  }
+  const Refinement result = refine::refine(views, std::vector<Link>{{0, 1}}, {}, Context(2)).value();
+  ASSERT_EQ(result.link_holds.at(0).free.size(), 1U) << result.link_holds[0].held.transpose();
+  const Motion& slide = result.link_holds[0].free[0];
+  EXPECT_FALSE(slide.is_turn);
+  EXPECT_NEAR(slide.direction.dot(along), 1.0, 1e-3);
+  ASSERT_EQ(result.view_holds.at(1).loose.size(), 1U);
+  EXPECT_TRUE(result.view_holds[1].loose[0].unheld);
+  EXPECT_FALSE(result.view_holds[1].loose[0].motion.is_turn);
+  EXPECT_NEAR(result.view_holds[1].loose[0].motion.direction.dot(along), 1.0, 1e-3);
+}
+
 TEST(Refine, ACylinderSlidesAlongAndTurnsAboutItsAxisOnly) {
   std::vector<View> views(2);
   for (std::size_t v = 0; v < 2; ++v) {
@@ -79,8 +132,31 @@ TEST(Refine, ACylinderSlidesAlongAndTurnsAboutItsAxisOnly) {
   views[1].model_from_scan.translation() = Eigen::Vector3d(0.3, -0.2, 0.0);
   const Refinement result = refine::refine(views, std::vector<Link>{{0, 1}}, {}, Context(2)).value();
   EXPECT_EQ(result.unheld.size(), 2U);
+  ASSERT_EQ(result.link_holds.at(0).free.size(), 2U) << result.link_holds[0].held.transpose();
+  ASSERT_EQ(result.view_holds.at(1).loose.size(), 2U);
+  for (const bool turn : {false, true}) {
+    for (const Motion& motion :
+         {result.link_holds[0].free[turn ? 1 : 0], result.view_holds[1].loose[turn ? 1 : 0].motion}) {
+      EXPECT_EQ(motion.is_turn, turn);
+      EXPECT_GT(std::abs(motion.direction.z()), 0.999);
+      if (turn) {
+        EXPECT_LT(motion.through.head<2>().norm(), 1.0) << "the axis of the cylinder";
+      }
+    }
+  }
   const Eigen::Vector3d axis_point = result.model_from_scan[1] * Eigen::Vector3d(0, 0, 40);
   EXPECT_LT((axis_point - Eigen::Vector3d(0, 0, 40)).norm(), 0.02);
+}
+
+TEST(Refine, WhatIsHeldOnAllSidesIsNotSaidToBeLoose) {
+  const test::Scene scene = test::bumpy_scene({}, 1);
+  const Refinement result = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  ASSERT_EQ(result.view_holds.size(), scene.views.size());
+  for (const ViewHold& hold : result.view_holds) EXPECT_TRUE(hold.loose.empty());
+  for (const LinkHold& hold : result.link_holds) {
+    EXPECT_TRUE(hold.free.empty());
+    EXPECT_LE(hold.held[5], 1.0 + 1e-9);
+  }
 }
 
 TEST(Refine, OneViewAloneStaysWhereItIs) {
