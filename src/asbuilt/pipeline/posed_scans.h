@@ -22,13 +22,14 @@ namespace asbuilt::pipeline {
 
 /// An accepted scan as the joint half needs it.
 struct PosedScan {
-  int index = 0;                                      ///< in the record
-  PointCloud part;                                    ///< in the scan frame minus the offset
+  int index = 0;          ///< in the record
+  PointCloud part;        ///< in the scan frame minus the offset
   PointCloud whole_part;  ///< as read, where remove_seen_through has taken points out of `part`; else empty
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
   Matrix6d covariance = Matrix6d::Zero();
+  refine::ViewHold hold;  ///< in the model frame
   double noise_sigma_mm = 0.0, spacing_mm = 0.0;
   scan::Viewpoint viewpoint;  ///< for the coordinates of `part`
 };
@@ -46,6 +47,9 @@ struct Contradiction {
   int member = 0;  ///< index into the posed scans
   std::string reason;
 };
+
+/// The same motion in another frame.
+[[nodiscard]] refine::Motion moved(const refine::Motion& motion, const Pose& b_from_a);
 
 /// An accepted scan with its part, read from its segment file. `index` is its place in the record.
 /// Errors: unreadable_input.
