@@ -21,7 +21,7 @@ struct Arguments {
   std::vector<std::string> folders, settings;
   std::vector<int> scans{8, 128};
   double angle = 0.0, shift = 0.0;
-  int seeds = 10, count = 40, scenes = 20, threads = 0;
+  int seeds = 10, count = 40, first = 0, scenes = 20, threads = 0;
 };
 
 Result<void> append(const Arguments& args, const std::vector<Trial>& trials) {
@@ -55,6 +55,27 @@ Result<void> run_own(const Arguments& args) {
     ASBUILT_TRY(trials, start_trials(scene, 1, context));
     for (Trial& trial : trials) trial.kind = "own";
     ASBUILT_CHECK(append(args, trials));
+  }
+  return {};
+}
+
+// A set of trials each, written as they end.
+Result<void> run_wrong(const Arguments& args) {
+  const Context context(args.threads);
+  const auto run_on = [&](const RefinementScene& scene) -> Result<void> {
+    for (int seed = args.first; seed < args.first + args.count; ++seed) {
+      ASBUILT_TRY(trial, wrong_trial(scene, seed, context));
+      ASBUILT_CHECK(append(args, {std::move(trial)}));
+    }
+    return {};
+  };
+  for (const std::string& folder : args.folders) {
+    ASBUILT_TRY(scene, scene_of_folder(folder, context));
+    ASBUILT_CHECK(run_on(scene));
+  }
+  for (int number = 0; number < args.scenes; ++number) {
+    ASBUILT_TRY(scene, own_scene(number, context));
+    ASBUILT_CHECK(run_on(scene));
   }
   return {};
 }
@@ -117,9 +138,12 @@ int run(int argc, char** argv) {
   CLI::App* summary = app.add_subcommand("summary", "tables and pictures of what was run");
   CLI::App* one = app.add_subcommand("one", "one start, printed");
   for (CLI::App* command : {starts, ablation, wrong, own, scale, peer, summary}) with_out(command);
-  for (CLI::App* command : {starts, ablation, wrong, peer, one}) with_folders(command);
+  for (CLI::App* command : {starts, ablation, peer, one}) with_folders(command);
+  wrong->add_option("folders", args.folders, "folders with truth.json");
+  wrong->add_option("--own", args.scenes, "scenes of our own simulator after them")->default_val(0);
+  wrong->add_option("--first", args.first, "first seed");
   for (CLI::App* command : {starts, peer}) command->add_option("--seeds", args.seeds);
-  wrong->add_option("--count", args.count);
+  wrong->add_option("--count", args.count, "trials a set");
   own->add_option("--scenes", args.scenes);
   scale->add_option("--scans", args.scans);
   one->add_option("--set", args.settings, "NAME=NUMBER");
@@ -136,8 +160,7 @@ int run(int argc, char** argv) {
     done =
         for_each_folder(args, [](const auto& scene, const auto& context) { return ablation_trials(scene, context); });
   } else if (wrong->parsed()) {
-    done = for_each_folder(
-        args, [&](const auto& scene, const auto& context) { return wrong_trials(scene, args.count, context); });
+    done = run_wrong(args);
   } else if (peer->parsed()) {
     done = for_each_folder(
         args, [&](const auto& scene, const auto& context) { return peer_trials(scene, args.seeds, context); });

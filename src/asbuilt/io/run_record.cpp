@@ -80,6 +80,29 @@ Json json_of(const CandidateRecord& candidate) {
           {"objection", candidate.objection}};
 }
 
+Json json_of(const MotionRecord& motion, bool of_scan) {
+  Json json{{"kind", motion.is_turn ? "turn" : "slide"},
+            {"direction", json_of(motion.direction)},
+            {"through", json_of(motion.through)}};
+  if (of_scan) {
+    json["sigma"] = json_number(motion.sigma);
+    json["unheld"] = motion.unheld;
+  }
+  return json;
+}
+
+Json json_of(const std::vector<MotionRecord>& motions, bool of_scan) {
+  Json all = Json::array();
+  for (const MotionRecord& motion : motions) all.push_back(json_of(motion, of_scan));
+  return all;
+}
+
+Json numbers_of(const std::vector<double>& values) {
+  Json all = Json::array();
+  for (const double value : values) all.push_back(json_number(value));
+  return all;
+}
+
 Json json_of(const ScanRecord& scan) {
   Json candidates = Json::array();
   for (const CandidateRecord& candidate : scan.candidates) candidates.push_back(json_of(candidate));
@@ -104,6 +127,8 @@ Json json_of(const ScanRecord& scan) {
           {"model_from_scan", json_of(scan.model_from_scan)},
           {"covariance", scan.covariance ? rows_of<6>(*scan.covariance) : Json(nullptr)},
           {"component", scan.component ? Json(*scan.component) : Json(nullptr)},
+          {"hold_sigma", numbers_of(scan.hold_sigma)},
+          {"loose_motions", json_of(scan.loose_motions, true)},
           {"votes", json_number(scan.votes)},
           {"score", json_number(scan.score)},
           {"visible_share", json_number(scan.visible_share)},
@@ -128,6 +153,13 @@ Json json_of(const RefinementRecord& refinement) {
   for (const EdgeRecord& edge : refinement.edges) {
     edges.push_back({{"from", edge.from}, {"to", edge.to}, {"pairs", edge.pairs}, {"rms", json_number(edge.rms)}});
   }
+  Json links = Json::array();
+  for (const LinkRecord& link : refinement.links) {
+    links.push_back({{"a", link.a},
+                     {"b", link.b},
+                     {"held", numbers_of(link.held)},
+                     {"free_motions", json_of(link.free_motions, false)}});
+  }
   return {
       {"component", refinement.component},
       {"fixed_scan", refinement.fixed_scan},
@@ -136,7 +168,8 @@ Json json_of(const RefinementRecord& refinement) {
       {"rms_after", json_number(refinement.rms_after)},
       {"converged", refinement.converged},
       {"gauge", {{"method", refinement.gauge_method}, {"model_from_refined", json_of(refinement.model_from_refined)}}},
-      {"edges", std::move(edges)}};
+      {"edges", std::move(edges)},
+      {"links", std::move(links)}};
 }
 
 Json json_of(const DeviationRecord& deviation) {
@@ -227,6 +260,28 @@ CandidateRecord candidate_of(const Json& json) {
   return candidate;
 }
 
+// What follows is absent from results of versions that did not tell it.
+std::vector<double> later_numbers_at(const Json& json, const char* key) {
+  std::vector<double> values;
+  if (!json.contains(key)) return values;
+  for (const Json& value : json.at(key)) {
+    values.push_back(value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>());
+  }
+  return values;
+}
+
+std::vector<MotionRecord> later_motions_at(const Json& json, const char* key) {
+  constexpr std::array<std::string_view, 2> kKinds{"slide", "turn"};
+  std::vector<MotionRecord> motions;
+  if (!json.contains(key)) return motions;
+  for (const Json& each : json.at(key)) {
+    motions.push_back({enum_of<bool>(each.at("kind"), kKinds), vector_of(each.at("direction")),
+                       vector_of(each.at("through")), each.contains("sigma") ? number_at(each, "sigma") : 0.0,
+                       each.value("unheld", false)});
+  }
+  return motions;
+}
+
 ScanRecord scan_of(const Json& json) {
   ScanRecord scan;
   scan.path = json.at("path").get<std::string>();
@@ -250,6 +305,8 @@ ScanRecord scan_of(const Json& json) {
   scan.model_from_scan = optional_pose(json.at("model_from_scan"));
   if (!json.at("covariance").is_null()) scan.covariance = matrix_of<6>(json.at("covariance"));
   if (!json.at("component").is_null()) scan.component = json.at("component").get<int>();
+  scan.hold_sigma = later_numbers_at(json, "hold_sigma");
+  scan.loose_motions = later_motions_at(json, "loose_motions");
   scan.votes = number_at(json, "votes");
   scan.score = number_at(json, "score");
   scan.visible_share = number_at(json, "visible_share");
@@ -285,6 +342,11 @@ RefinementRecord refinement_of(const Json& json) {
   for (const Json& edge : json.at("edges")) {
     refinement.edges.push_back({edge.at("from").get<int>(), edge.at("to").get<int>(),
                                 edge.at("pairs").get<std::uint64_t>(), number_at(edge, "rms")});
+  }
+  if (!json.contains("links")) return refinement;  // of a version that did not tell them
+  for (const Json& link : json.at("links")) {
+    refinement.links.push_back({link.at("a").get<int>(), link.at("b").get<int>(), later_numbers_at(link, "held"),
+                                later_motions_at(link, "free_motions")});
   }
   return refinement;
 }

@@ -55,6 +55,15 @@ struct CandidateRecord {
   static constexpr double kNotTold = std::numeric_limits<double>::quiet_NaN();
 };
 
+/// A slide, or a turn about an axis, in the model frame.
+struct MotionRecord {
+  bool is_turn = false;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d through = Eigen::Vector3d::Zero();  ///< a point of the axis; of a slide: the middle of what slides
+  double sigma = 0.0;                                 ///< standard deviation, mm; of a scan only
+  bool unheld = false;                                ///< nothing holds it
+};
+
 struct ScanRecord {
   std::string path;  ///< as the user gave it
   std::string name;
@@ -72,6 +81,8 @@ struct ScanRecord {
   std::optional<Pose> model_from_scan_detected, model_from_scan;
   std::optional<Matrix6d> covariance;
   std::optional<int> component;
+  std::vector<double> hold_sigma;           ///< mm, of six principal motions against the fixed scan, descending
+  std::vector<MotionRecord> loose_motions;  ///< those along which the scans it overlaps hold it badly or not at all
   double votes = 0.0, score = 0.0, visible_share = 0.0, free_space_violations = 0.0, normal_agreement = 0.0;
   double margin = 0.0;
   std::vector<CandidateRecord> candidates;
@@ -99,6 +110,13 @@ struct EdgeRecord {
   double rms = 0.0;
 };
 
+/// How well each direction is held by what two scans share.
+struct LinkRecord {
+  int a = 0, b = 0;                        ///< indices into RunRecord::scans
+  std::vector<double> held;                ///< information of six principal motions, ascending; 1: every match holds it
+  std::vector<MotionRecord> free_motions;  ///< those that nothing both see holds
+};
+
 struct RefinementRecord {
   int component = 0, fixed_scan = 0, iterations = 0;
   double rms_before = 0.0, rms_after = 0.0;
@@ -106,6 +124,7 @@ struct RefinementRecord {
   std::string gauge_method = "best_fit";  ///< "best_fit" or "fixed"
   Pose model_from_refined = Pose::Identity();
   std::vector<EdgeRecord> edges;
+  std::vector<LinkRecord> links;
 };
 
 struct DeviationRecord {

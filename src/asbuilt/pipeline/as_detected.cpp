@@ -7,6 +7,8 @@ io::ScanRecord as_detected(io::ScanRecord scan) {
   using enum io::ScanStatus;
   scan.covariance.reset();
   scan.component.reset();
+  scan.hold_sigma.clear();
+  scan.loose_motions.clear();
   scan.model_from_scan.reset();
   if (scan.status == dropped || scan.status == disconnected) {
     scan.status = accepted;

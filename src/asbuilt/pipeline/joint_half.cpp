@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "asbuilt/fuse/mesh.h"
 #include "asbuilt/pipeline/posed_scans.h"
@@ -97,8 +99,10 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
 io::GraphRecord recorded_graph(const graph::PoseGraph& graph, const std::vector<PosedScan>& scans) {
   const auto index = [&](int scan) { return scans[static_cast<std::size_t>(scan)].index; };
   io::GraphRecord record;
+  std::set<std::pair<int, int>> links;
+  for (const graph::PairOverlap& edge : graph.edges) links.emplace(edge.first, edge.second);
   for (const graph::PairOverlap& pair : graph.overlaps) {
-    const bool linked = std::ranges::find(graph.edges, pair) != graph.edges.end();
+    const bool linked = links.contains({pair.first, pair.second});
     record.overlaps.push_back({index(pair.first), index(pair.second), pair.overlap, linked});
   }
   for (const std::vector<int>& component : graph.components) {
@@ -126,6 +130,14 @@ io::RefinementRecord recorded_refinement(const RefinedComponent& component, int 
   for (const refine::EdgeResidual& edge : refinement.edges) {
     record.edges.push_back({index(edge.first), index(edge.second), edge.pairs, edge.rms_mm});
   }
+  for (const refine::LinkHold& hold : refinement.link_holds) {
+    io::LinkRecord link{index(hold.first), index(hold.second), {hold.held.begin(), hold.held.end()}, {}};
+    for (const refine::Motion& motion : hold.free) {
+      const refine::Motion there = moved(motion, component.model_from_refined);
+      link.free_motions.push_back({there.is_turn, there.direction, there.through, 0.0, true});
+    }
+    record.links.push_back(std::move(link));
+  }
   return record;
 }
 
@@ -141,6 +153,26 @@ std::string missing_link(int scan, const std::vector<int>& largest, const graph:
   return "it overlaps with no scan of the largest component";
 }
 
+std::string in_words(const refine::LooseMotion& loose) {
+  const Eigen::Vector3d& d = loose.motion.direction;
+  std::string text = loose.motion.is_turn ? "turn about" : "slide along";
+  text += fmt::format(" ({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
+  return text + (loose.unheld ? std::string(" by any amount") : fmt::format(" by {:.2g} mm (1 sigma)", loose.sigma_mm));
+}
+
+/// How firmly the others hold a scan; a sentence where they do not.
+void describe_hold(io::ScanRecord& scan, const refine::ViewHold& hold, const Context& context) {
+  if (!hold.sigma_mm.isZero(0.0)) scan.hold_sigma.assign(hold.sigma_mm.begin(), hold.sigma_mm.end());
+  std::string motions;
+  for (const refine::LooseMotion& loose : hold.loose) {
+    const refine::Motion& motion = loose.motion;
+    scan.loose_motions.push_back({motion.is_turn, motion.direction, motion.through, loose.sigma_mm, loose.unheld});
+    motions += (motions.empty() ? "" : ", ") + in_words(loose);
+  }
+  if (motions.empty()) return;
+  context.warn(fmt::format("{}: held weakly by the scans that it overlaps: it may {}", scan.path, motions));
+}
+
 void describe_scans(io::RunRecord& record, const Registration& registration, const Context& context) {
   const std::vector<PosedScan>& scans = registration.scans;
   for (std::size_t number = 0; number < registration.components.size(); ++number) {
@@ -150,6 +182,7 @@ void describe_scans(io::RunRecord& record, const Registration& registration, con
       scan.model_from_scan = posed.model_from_local * Eigen::Translation3d(-scan.offset);
       scan.covariance = posed.covariance;
       scan.component = static_cast<int>(number);
+      describe_hold(scan, posed.hold, context);
       if (number == 0) continue;
       scan.status = io::ScanStatus::disconnected;
       scan.reason_code = "disconnected";

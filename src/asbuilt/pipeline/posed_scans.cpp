@@ -25,9 +25,10 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
 
 /// The graph's edges among the members, numbered by their place in `members`.
 std::vector<refine::Link> links_among(const std::vector<int>& members, const graph::PoseGraph& graph) {
+  std::vector<int> places(static_cast<std::size_t>(*std::ranges::max_element(members)) + 1, -1);
+  for (std::size_t i = 0; i < members.size(); ++i) places[static_cast<std::size_t>(members[i])] = static_cast<int>(i);
   const auto place = [&](int scan) {
-    const auto found = std::ranges::find(members, scan);
-    return found == members.end() ? -1 : static_cast<int>(found - members.begin());
+    return static_cast<std::size_t>(scan) < places.size() ? places[static_cast<std::size_t>(scan)] : -1;
   };
   std::vector<refine::Link> links;
   for (const graph::PairOverlap& edge : graph.edges) {
@@ -67,6 +68,10 @@ scan::Viewpoint local_viewpoint(const io::ScanRecord& scan) {
 }
 
 }  // namespace
+
+refine::Motion moved(const refine::Motion& motion, const Pose& b_from_a) {
+  return {motion.is_turn, b_from_a.linear() * motion.direction, b_from_a * motion.through};
+}
 
 Result<PosedScan> posed_scan(const io::ScanRecord& scan, int index, const std::filesystem::path& segment) {
   ASBUILT_EXPECT(scan.model_from_scan.has_value(), "a scan with a pose");
@@ -117,6 +122,10 @@ Result<RefinedComponent> refine_component(const std::vector<int>& members, const
     PosedScan& scan = scans[static_cast<std::size_t>(members[i])];
     scan.model_from_local = orthonormalised(component.model_from_refined * component.refinement.model_from_scan[i]);
     scan.covariance = turned * component.refinement.covariance[i] * turned.transpose();
+    scan.hold = component.refinement.view_holds.empty() ? refine::ViewHold{} : component.refinement.view_holds[i];
+    for (refine::LooseMotion& loose : scan.hold.loose) {
+      loose.motion = moved(loose.motion, component.model_from_refined);
+    }
   }
   return component;
 }

@@ -31,6 +31,7 @@ struct PosedScan {
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
   Matrix6d covariance = Matrix6d::Zero();
+  refine::ViewHold hold;  ///< in the model frame
   double noise_sigma_mm = 0.0, spacing_mm = 0.0;
   scan::Viewpoint viewpoint;  ///< for the coordinates of `part`
 };
@@ -48,6 +49,9 @@ struct Contradiction {
   int member = 0;  ///< index into the posed scans
   std::string reason;
 };
+
+/// The same motion in another frame.
+[[nodiscard]] refine::Motion moved(const refine::Motion& motion, const Pose& b_from_a);
 
 /// An accepted scan with its part, read from its segment file. `index` is its place in the record.
 /// Errors: unreadable_input.

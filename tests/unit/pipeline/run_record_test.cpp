@@ -34,6 +34,8 @@ RunRecord example() {
   scan.model_from_scan = scan.model_from_scan_detected;
   scan.covariance = Matrix6d::Identity() / 3.0;
   scan.component = 0;
+  scan.hold_sigma = {50.0, 0.1, 1.0 / 3.0, 0.01, 0.01, 0.01};
+  scan.loose_motions = {{true, Eigen::Vector3d::UnitX(), {0.1, 2.0, 3.0}, 50.0, true}, {}};
   scan.score = 0.1 + 0.2;
   scan.candidates.push_back({});
   scan.candidates.push_back({});
@@ -47,6 +49,7 @@ RunRecord example() {
   record.scans = {scan, ScanRecord{}};
   record.graph = GraphRecord{{{0, 1, 0.25, true}}, {{0, 1}}};
   record.refinement = {RefinementRecord{}};
+  record.refinement->front().links = {{0, 1, {0.1, 1.0 / 3.0}, {{false, Eigen::Vector3d::UnitY(), {}, 0.0, false}}}};
   record.deviation = DeviationRecord{0.1, 0.2, 0.3, 0.4, std::nullopt, 0.5, "fail"};
   return record;
 }
@@ -59,13 +62,18 @@ TEST(RunRecord, ComesBackExactlyAsItWasWritten) {
   EXPECT_EQ(back->scans[0].model_from_scan->matrix(), example().scans[0].model_from_scan->matrix());
   EXPECT_EQ(back->scans[0].score, 0.1 + 0.2);
   EXPECT_EQ(back->options, example().options);
+  EXPECT_EQ(back->scans[0].hold_sigma, example().scans[0].hold_sigma);
+  ASSERT_EQ(back->scans[0].loose_motions.size(), 2U);
+  EXPECT_TRUE(back->scans[0].loose_motions[0].is_turn && back->scans[0].loose_motions[0].unheld);
+  EXPECT_EQ(back->scans[0].loose_motions[0].through, Eigen::Vector3d(0.1, 2.0, 3.0));
+  EXPECT_EQ(back->refinement->front().links.at(0).held, example().refinement->front().links[0].held);
 }
 
 TEST(RunRecord, OfAnEarlierVersionIsReadWithoutTheFieldsThatCameLater) {
   std::string text = to_json(example());
-  for (const char* later :
-       {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share", "missing_share",
-        "residual_ratio", "weakest_direction", "slip_lead", "overrun_share", "objection"}) {
+  for (const char* later : {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share",
+                            "missing_share", "residual_ratio", "weakest_direction", "slip_lead", "overrun_share",
+                            "objection", "hold_sigma", "loose_motions", "links"}) {
     const std::string key = std::string("\"") + later + "\":";
     for (auto at = text.find(key); at != std::string::npos; at = text.find(key)) text.replace(at, key.size(), "\"x\":");
   }
