@@ -16,7 +16,9 @@ namespace {
 
 constexpr float kSameSideCosine = 0.5F;       // foot and place lie on faces turned by less than 60 degrees
 constexpr float kRoundTheEdgeCosine = -0.5F;  // on faces that meet in an edge; turned further it may be the other wall
-constexpr std::size_t kAround = 6;            // points that tell the spacing about a place
+constexpr float kOwnFaceCosine =
+    0.25F;                           // a point's own normal and its face: 75 degrees, as normals at edges are rounded
+constexpr std::size_t kAround = 6;   // points that tell the spacing about a place
 constexpr double kOwnReach = 0.6;    // in spacings: discs about the points of a rim then reach half of one beyond it
 constexpr double kInnerReach = 1.1;  // in spacings, among points on all sides: no hole of a scattered cloud is wider
 constexpr double kHalfDisc = 0.75;   // half a disc, and what the square of the spacing misses of it at a rim

@@ -49,7 +49,7 @@ TEST(MeasuredCloud, TakesTheStandardErrorInTheUnitOfTheCloud) {
   auto columns = rows.places();
   columns.push_back({"sigma", std::span<const float>(rows.sigma)});
   Options options;
-  options.scan_unit.unit = io::Unit::metre;
+  options.scan_unit = io::Unit::metre;
   const auto measured = measured_cloud(written("in_metres.ply", columns), LoadedModel{}, options, Context(2));
   ASSERT_TRUE(measured.has_value()) << measured.error().message;
   EXPECT_EQ(measured->cloud.positions[1], Eigen::Vector3f(2000, 6000, 9000));
