@@ -251,6 +251,23 @@ TEST(InspectProperty, MorePointsNeverTakeCoverageAway) {
   }
 }
 
+// The outermost rows lie most of a spacing away from the edges. Where the scan goes on beyond the edge that is no rim;
+// where it does not, a rim reaches half a spacing further than the points.
+TEST(InspectProperty, AScanThatGoesRoundTheEdgesLeavesNoGreyAlongThem) {
+  constexpr double kStep = 2.0, kFromEdge = 0.95 * kStep;
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Random random(seed, "edges", 0);
+    PointCloud all, top;
+    for (int side = 0; side < 6; ++side) {
+      add_side(all, side / 2, side % 2 == 1, 0.0, kStep, kFromEdge - 0.5 * kStep, random);
+    }
+    add_side(top, 2, true, 0.0, kStep, kFromEdge - 0.5 * kStep, random);
+    EXPECT_GE(inspected(all, cube()).coverage, 0.99) << "seed " << seed;
+    const double scanned = kEdge - 2.0 * (kFromEdge - 0.6 * kStep);  // the square that is within reach of the points
+    EXPECT_NEAR(inspected(top, cube()).coverage, scanned * scanned / (6.0 * kEdge * kEdge), 0.003) << "seed " << seed;
+  }
+}
+
 TEST(InspectProperty, OneWallOfAThinPlateSaysNothingAboutTheOther) {
   for (const double thickness : {0.4, 1.0, 3.0}) {
     const model::PreparedModel plate = prepared(test::joined(test::box({0, 0, 0}, {kEdge, kEdge, thickness}, 8)));
