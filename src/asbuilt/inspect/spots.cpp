@@ -16,10 +16,11 @@ namespace {
 
 constexpr float kSameSideCosine = 0.5F;       // foot and place lie on faces turned by less than 60 degrees
 constexpr float kRoundTheEdgeCosine = -0.5F;  // on faces that meet in an edge; turned further it may be the other wall
-constexpr float kOwnFaceCosine =
-    0.25F;                           // a point's own normal and its face: 75 degrees, as normals at edges are rounded
+// Of a point's own normal and its face: 75 degrees, as normals at edges are rounded.
+constexpr float kOwnFaceCosine = 0.25F;
 constexpr std::size_t kAround = 6;   // points that tell the spacing about a place
 constexpr double kOwnReach = 0.6;    // in spacings: discs about the points of a rim then reach half of one beyond it
+constexpr double kEdgeReach = 0.85;  // in spacings, at an edge that the points go round: rows end anywhere before it
 constexpr double kInnerReach = 1.1;  // in spacings, among points on all sides: no hole of a scattered cloud is wider
 constexpr double kHalfDisc = 0.75;   // half a disc, and what the square of the spacing misses of it at a rim
 constexpr double kMeanReach = 1.5;   // in spacings: the mean takes in the next neighbours at least
@@ -73,6 +74,12 @@ std::array<Eigen::Vector3f, 2> tangents(const Eigen::Vector3f& normal) {
   const Eigen::Vector3f first = normal.unitOrthogonal();
   return {first, normal.cross(first)};
 }
+
+/// How far the points may be that speak for a place.
+struct Reaches {
+  double own_mm = 0.0;    ///< points so near belong to the place whatever their spacing
+  double at_edges = 0.0;  ///< in spacings, at an edge that the points go round
+};
 
 /// Scratch memory of one block of places.
 struct Scratch {
@@ -217,11 +224,10 @@ struct SpotFinder::Implementation {
     return offset - offset.dot(normal) * (w.normal - cosine * normal).normalized();
   }
 
-  /// `own_radius`: points so near belong to the place whatever their spacing.
-  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double own_radius,
+  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, const Reaches& reaches,
                         Scratch& scratch) const {
     std::vector<Near>& near = scratch.near;
-    double reach = std::max(own_radius, 1.5 * spacing);
+    double reach = std::max(reaches.own_mm, 1.5 * spacing);
     gather(position, normal, reach, near);
     while (near.size() < kAround && 2.0 * reach < 8.0 * radius) {
       reach *= 2.0;
@@ -243,18 +249,19 @@ struct SpotFinder::Implementation {
     // reaches past them.
     const double area = (surrounded ? 1.0 : kHalfDisc) * std::numbers::pi * static_cast<double>(squared_around);
     const double local = std::min(std::sqrt(area / static_cast<double>(last + 1)), 4.0 * std::max(spacing, 1e-12));
-    if (static_cast<double>(nearest) > kInnerReach * local) return {};
+    if (static_cast<double>(nearest) > (surrounded ? kInnerReach : reaches.at_edges) * local) return {};
     if (!surrounded && static_cast<double>(nearest) > kOwnReach * local) {
       // No rim if the scan goes on round an edge.
       gather(position, normal, std::sqrt(static_cast<double>(squared_view)), scratch.round_edge, kRoundTheEdgeCosine);
       if (!is_surrounded(position, normal, scratch.round_edge, squared_view, scratch.angles)) return {};
     }
-    const auto mean_reach = static_cast<float>(std::max(own_radius, kMeanReach * local));
+    const auto mean_reach = static_cast<float>(std::max(reaches.own_mm, kMeanReach * local));
     std::erase_if(near, [&](const Near& n) { return n.squared_distance > mean_reach * mean_reach; });
     return near.empty() ? Spot{} : averaged(position, normal, scratch);
   }
 
-  [[nodiscard]] std::vector<Spot> all_at(const PointCloud& places, double own_radius, const Context& context) const;
+  [[nodiscard]] std::vector<Spot> all_at(const PointCloud& places, const Reaches& reaches,
+                                         const Context& context) const;
 
   [[nodiscard]] Spot averaged(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, Scratch& scratch) const {
     scratch.values.clear();
@@ -339,22 +346,23 @@ double SpotFinder::noise_sigma_mm() const { return implementation_->noise; }
 double SpotFinder::spacing_mm() const { return implementation_->spacing; }
 
 std::vector<Spot> SpotFinder::at(const PointCloud& places, const Context& context) const {
-  return implementation_->all_at(places, kOwnRadius * implementation_->radius, context);
+  return implementation_->all_at(places, {kOwnRadius * implementation_->radius, kEdgeReach}, context);
 }
 
 std::vector<Spot> SpotFinder::detailed_at(const PointCloud& places, const Context& context) const {
   const double radius = std::min(kOwnRadius * implementation_->radius, kDetailSpacings * implementation_->spacing);
-  return implementation_->all_at(places, radius, context);
+  // Vertices lie on the edges themselves, further from the last row than the surface beside them.
+  return implementation_->all_at(places, {radius, kInnerReach}, context);
 }
 
-std::vector<Spot> SpotFinder::Implementation::all_at(const PointCloud& places, double own_radius,
+std::vector<Spot> SpotFinder::Implementation::all_at(const PointCloud& places, const Reaches& reaches,
                                                      const Context& context) const {
   std::vector<Spot> spots(places.size());
   parallel_for_blocks(context, places.size(), 256, [&](std::size_t begin, std::size_t end) {
     if (context.cancelled()) return;
     Scratch scratch;
     for (std::size_t i = begin; i < end; ++i) {
-      spots[i] = at(places.positions[i], places.normals[i], own_radius, scratch);
+      spots[i] = at(places.positions[i], places.normals[i], reaches, scratch);
     }
   });
   return spots;
