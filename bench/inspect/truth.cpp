@@ -15,7 +15,11 @@ const double kCosLimit = std::cos(simulate::NoiseModel{}.grazing_deg * std::numb
 }  // namespace
 
 InspectionTruth::InspectionTruth(const simulate::Simulation& simulation)
-    : rays_(simulation.as_built), surface_(simulation.as_built), reach_mm_(0.02 * diameter(simulation.model)) {
+    : rays_(simulation.as_built),
+      surface_(simulation.as_built),
+      cad_(simulation.model),
+      true_vertices_(simulation.as_built.vertices),
+      reach_mm_(0.02 * diameter(simulation.model)) {
   for (const simulate::SimulatedScan& scan : simulation.scans) {
     if (scan.model_from_scan) sensors_in_model_.emplace_back(scan.model_from_scan->translation());
   }
@@ -31,6 +35,19 @@ bool InspectionTruth::is_visible(const Eigen::Vector3d& position, const Eigen::V
     if (!rays_.is_blocked(point, way / distance, 0.0, distance)) return true;
   }
   return false;
+}
+
+std::optional<double> InspectionTruth::peak(const simulate::Bump& bump,
+                                            const std::function<bool(const Eigen::Vector3d& place)>& is_scanned) const {
+  std::optional<double> furthest;
+  for (const Eigen::Vector3d& vertex : true_vertices_) {
+    if ((vertex - bump.centre_in_model).norm() > bump.radius_mm) continue;
+    const auto foot = cad_.nearest(vertex, reach_mm_);
+    if (!foot.found() || foot.signed_distance * bump.height_mm <= 0.0) continue;
+    if (furthest && std::abs(foot.signed_distance) <= std::abs(*furthest)) continue;
+    if (is_scanned(foot.point)) furthest = foot.signed_distance;
+  }
+  return furthest;
 }
 
 std::optional<double> InspectionTruth::deviation(const Eigen::Vector3d& position) const {

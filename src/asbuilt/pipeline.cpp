@@ -2,6 +2,7 @@
 #include "asbuilt/pipeline.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "asbuilt/core/parallel.h"
@@ -28,10 +29,10 @@ Result<RunFolder> open(const Output& output, std::string_view command, const Con
   return std::move(folder);
 }
 
-Result<LoadedModel> prepared(const std::string& path, const Options& options, RunFolder& folder,
-                             const Context& context) {
+Result<LoadedModel> prepared(const std::string& path, const Options& options, RunFolder& folder, const Context& context,
+                             model::PreparedFor use = model::PreparedFor::everything) {
   const auto timed = folder.stage("prepare_model");
-  return load_model(path, options, context);
+  return load_model(path, options, context, use);
 }
 
 /// What can be said of a scan half alone: without a readable scan the run has failed.
@@ -91,7 +92,7 @@ Result<inspect::DeviationReport> inspect_cloud(const std::string& model_path, co
   ASBUILT_CHECK(options.validate());
   ASBUILT_TRY(inputs, inspection_inputs(options));
   ASBUILT_TRY(folder, open(output, "inspect", context));
-  ASBUILT_TRY(model, prepared(model_path, options, folder, context));
+  ASBUILT_TRY(model, prepared(model_path, options, folder, context, model::PreparedFor::inspection));
   std::optional<MeasuredCloud> measured;
   {
     const auto timed = folder.stage("read");
@@ -101,7 +102,9 @@ Result<inspect::DeviationReport> inspect_cloud(const std::string& model_path, co
   std::optional<inspect::DeviationReport> deviations;
   {
     const auto timed = folder.stage("inspect");
-    ASBUILT_TRY(found, inspect::inspect(measured->cloud, model.prepared, inputs.options, context));
+    const inspect::Measurement measurement{measured->cloud, measured->columns.scan, measured->columns.support,
+                                           measured->columns.sigma_mm};
+    ASBUILT_TRY(found, inspect::inspect(measurement, model.prepared, inputs.options, context));
     deviations = std::move(found);
   }
   {
@@ -117,9 +120,14 @@ Result<inspect::DeviationReport> inspect_cloud(const std::string& model_path, co
     input.views = options.views;
     input.steps = options.colour_steps;
     const report::ColourMap colours = report::colours_of(input);
-    const auto path = folder.file("deviation.ply");
-    ASBUILT_CHECK(write_deviations(path, measured->cloud, deviations->deviation_mm, colours));
-    ASBUILT_CHECK(report::write_report(folder.file(""), input, context));
+    const auto path = folder.file("deviation.ply"), report_folder = folder.file("");
+    // The cloud is large and the page takes thought: the one goes to disk while the other is made.
+    std::array<Result<void>, 2> written;
+    context.arena().run_blocks(written.size(), [&](std::size_t which) {
+      written[which] = which == 0 ? write_deviations(path, measured->cloud, deviations->deviation_mm, colours)
+                                  : report::write_report(report_folder, input, context);
+    });
+    for (const Result<void>& result : written) ASBUILT_CHECK(result);
   }
   ASBUILT_CHECK(folder.finish());
   return std::move(*deviations);

@@ -8,6 +8,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/model/surface_search.h"
 
 namespace asbuilt::inspect {
 namespace {
@@ -20,11 +21,12 @@ Result<void> check_share(std::string_view name, double value) {
 /// The feet after the alignment that was asked for, which needs those before it.
 Result<Feet> aligned_feet(const Measurement& measurement, const model::PreparedModel& model,
                           const InspectOptions& options, Alignment& alignment, const Context& context) {
-  ASBUILT_TRY(feet, feet_of(measurement.cloud, Pose::Identity(), model, context));
+  const model::SurfaceSearch surface(model.skin);
+  ASBUILT_TRY(feet, feet_of(measurement.cloud, Pose::Identity(), model, surface, context));
   ASBUILT_TRY(found, aligned(measurement, feet, model, options.alignment, context));
   alignment = std::move(found);
   if (alignment.method == AlignmentMethod::as_given) return std::move(feet);
-  return feet_of(measurement.cloud, alignment.model_from_given, model, context);
+  return feet_of(measurement.cloud, alignment.model_from_given, model, surface, context);
 }
 
 /// Statistics, with the shares counted value by value, since each may have its own tolerance.
@@ -210,7 +212,7 @@ class Inspection {
   void find_spots(Feet feet) {
     spacing_ = median_spacing(model_.dense_samples.positions);
     report_.finder = std::make_shared<const SpotFinder>(measurement_, report_.alignment.model_from_given, feet, model_,
-                                                        spacing_, max_distance());
+                                                        spacing_, max_distance(), context_);
     report_.noise_sigma_mm = report_.finder->noise_sigma_mm();
     report_.spacing_mm = report_.finder->spacing_mm();
     report_.spots = report_.finder->at(model_.dense_samples, context_);
@@ -267,6 +269,8 @@ class Inspection {
     };
     report_.regions = regions_out_of(model_.dense_samples, report_.spots, report_.face_of_spot, tolerance_of,
                                      *report_.finder, options);
+    // Fitted over a plane; the surface may be bent.
+    for (Region& region : report_.regions) region.peak.point = model_.surface->nearest(region.peak.point).point;
     report_.region_of_spot.assign(report_.spots.size(), -1);
     for (std::size_t k = 0; k < report_.regions.size(); ++k) {
       for (const std::uint32_t spot : report_.regions[k].spots) {

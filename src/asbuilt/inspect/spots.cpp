@@ -9,13 +9,18 @@
 
 #include "asbuilt/core/cube_rows.h"
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/inspect/paraboloid.h"
 
 namespace asbuilt::inspect {
 namespace {
 
-constexpr float kSameSideCosine = 0.5F;  // foot and place lie on faces turned by less than 60 degrees
-constexpr std::size_t kAround = 6;       // points that tell the spacing about a place
+constexpr float kSameSideCosine = 0.5F;       // foot and place lie on faces turned by less than 60 degrees
+constexpr float kRoundTheEdgeCosine = -0.5F;  // on faces that meet in an edge; turned further it may be the other wall
+// Of a point's own normal and its face: 75 degrees, as normals at edges are rounded.
+constexpr float kOwnFaceCosine = 0.25F;
+constexpr std::size_t kAround = 6;   // points that tell the spacing about a place
 constexpr double kOwnReach = 0.6;    // in spacings: discs about the points of a rim then reach half of one beyond it
+constexpr double kEdgeReach = 0.85;  // in spacings, at an edge that the points go round: rows end anywhere before it
 constexpr double kInnerReach = 1.1;  // in spacings, among points on all sides: no hole of a scattered cloud is wider
 constexpr double kHalfDisc = 0.75;   // half a disc, and what the square of the spacing misses of it at a rim
 constexpr double kMeanReach = 1.5;   // in spacings: the mean takes in the next neighbours at least
@@ -23,10 +28,11 @@ constexpr double kOwnRadius = 0.75;  // of the radius that is asked for: neighbo
 constexpr double kDetailSpacings = 5.0;  // radius of some 80 points
 constexpr double kPriorWeight = 8.0;     // points' worth of belief in the cloud's overall noise
 constexpr double kOutlier = 3.5;         // in noise sigmas, from the median
+constexpr std::size_t kGrain = 1 << 14;
 
 /// What one point says, in the order of the grid.
 struct Witness {
-  Eigen::Vector3f foot, normal;
+  Eigen::Vector3f foot = Eigen::Vector3f::Zero(), normal = Eigen::Vector3f::Zero();
   float deviation = 0.0F, sigma = 0.0F;
   std::uint16_t scan = Spot::kNoScan, support = 1;
 };
@@ -43,15 +49,41 @@ double median_of(std::vector<double>& values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
+/// The indices below `count` that a test holds for, ascending.
+template <class Test>
+std::vector<std::uint32_t> chosen_of(std::size_t count, const Context& context, const Test& test) {
+  std::vector<std::size_t> starts((count + kGrain - 1) / kGrain + 1, 0);
+  parallel_for_blocks(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+    std::size_t here = 0;
+    for (std::size_t i = begin; i < end; ++i) here += test(i) ? 1 : 0;
+    starts[begin / kGrain + 1] = here;
+  });
+  for (std::size_t block = 1; block < starts.size(); ++block) starts[block] += starts[block - 1];
+  std::vector<std::uint32_t> chosen(starts.back());
+  parallel_for_blocks(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+    std::size_t place = starts[begin / kGrain];
+    for (std::size_t i = begin; i < end; ++i) {
+      if (test(i)) chosen[place++] = static_cast<std::uint32_t>(i);
+    }
+  });
+  return chosen;
+}
+
 /// Two directions across a normal.
 std::array<Eigen::Vector3f, 2> tangents(const Eigen::Vector3f& normal) {
   const Eigen::Vector3f first = normal.unitOrthogonal();
   return {first, normal.cross(first)};
 }
 
+/// How far the points may be that speak for a place.
+struct Reaches {
+  double own_mm = 0.0;    ///< points so near belong to the place whatever their spacing
+  double at_edges = 0.0;  ///< in spacings, at an edge that the points go round
+};
+
 /// Scratch memory of one block of places.
 struct Scratch {
-  std::vector<Near> near;
+  std::vector<Near> near, round_edge;
   std::vector<double> values, angles;
   std::vector<std::pair<std::uint16_t, std::uint32_t>> scans;  // scan and number of its points
 };
@@ -60,48 +92,48 @@ struct Scratch {
 
 struct SpotFinder::Implementation {
   std::vector<Witness> witnesses;
-  std::vector<Eigen::Vector3f> feet;  // of the witnesses, for the grid; dropped after building
   std::unique_ptr<CubeRows> cubes;
   std::vector<ScanPose> poses;
   double radius = 0.0, spacing = 0.0, noise = 0.0;
 
   Implementation(const Measurement& m, const Pose& model_from_cloud, const Feet& all, const model::PreparedModel& model,
-                 double radius_mm, double max_distance_mm)
+                 double radius_mm, double max_distance_mm, const Context& context)
       : poses(m.poses.begin(), m.poses.end()), radius(radius_mm) {
-    std::vector<std::uint32_t> chosen;
     const Eigen::Matrix3f rotation = model_from_cloud.linear().cast<float>();
-    for (std::uint32_t i = 0; i < m.cloud.size(); ++i) {
-      if (!(std::abs(all.deviation_mm[i]) <= max_distance_mm)) continue;
+    const std::vector<std::uint32_t> chosen = chosen_of(m.cloud.size(), context, [&](std::size_t i) {
+      if (!(std::abs(all.deviation_mm[i]) <= max_distance_mm)) return false;
       // The other wall of a thin sheet can be nearer; a point's own normal tells which wall it was measured on.
-      const Eigen::Vector3f& face = model.face_normals[all.triangles[i]];
-      if (m.cloud.has_normals() && (rotation * m.cloud.normals[i]).dot(face) < 0.0F) continue;
-      chosen.push_back(i);
-      feet.push_back(all.points[i]);
-    }
+      return !m.cloud.has_normals() ||
+             (rotation * m.cloud.normals[i]).dot(model.face_normals[all.triangles[i]]) >= 0.0F;
+    });
+    std::vector<Eigen::Vector3f> feet(chosen.size());
+    parallel_for(context, feet.size(), kGrain, [&](std::size_t k) { feet[k] = all.points[chosen[k]]; });
     cubes = std::make_unique<CubeRows>(feet, std::max(0.5 * radius, 1e-6 * model.diameter));
-    witnesses.reserve(chosen.size());
-    for (const std::uint32_t place : cubes->order()) {
-      const std::uint32_t i = chosen[place];
-      Witness w{all.points[i], model.face_normals[all.triangles[i]], all.deviation_mm[i]};
+    const auto order = cubes->order();
+    witnesses.resize(order.size());
+    parallel_for(context, order.size(), kGrain, [&](std::size_t place) {
+      const std::uint32_t i = chosen[order[place]];
+      Witness& w = witnesses[place];
+      w.foot = feet[order[place]];
+      w.normal = model.face_normals[all.triangles[i]];
+      w.deviation = all.deviation_mm[i];
       if (!m.sigma_mm.empty()) w.sigma = m.sigma_mm[i];
       if (!m.scan.empty()) w.scan = m.scan[i];
       if (!m.support.empty()) w.support = m.support[i];
-      witnesses.push_back(w);
-    }
-    feet = {};
+    });
     spacing = median_distance(model.diameter);
     noise = overall_noise();
   }
 
-  void gather(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double reach,
-              std::vector<Near>& near) const {
+  void gather(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double reach, std::vector<Near>& near,
+              float least_cosine = kSameSideCosine) const {
     near.clear();
     const auto radius_f = static_cast<float>(reach);
     cubes->around(position, radius_f, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Witness& w = witnesses[i];
         const float squared = (w.foot - position).squaredNorm();
-        if (squared <= radius_f * radius_f && w.normal.dot(normal) > kSameSideCosine) {
+        if (squared <= radius_f * radius_f && w.normal.dot(normal) > least_cosine) {
           near.push_back({squared, static_cast<std::uint32_t>(i)});
         }
       }
@@ -165,29 +197,37 @@ struct SpotFinder::Implementation {
   }
 
   /// Whether the points lie on all sides of a place: no gap of half a turn between their directions.
-  [[nodiscard]] bool is_surrounded(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, Scratch& scratch,
-                                   float squared_reach) const {
+  [[nodiscard]] bool is_surrounded(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
+                                   const std::vector<Near>& near, float squared_reach,
+                                   std::vector<double>& angles) const {
     const auto across = tangents(normal);
-    scratch.angles.clear();
-    for (const Near& n : scratch.near) {
+    angles.clear();
+    for (const Near& n : near) {
       if (n.squared_distance > squared_reach) continue;
-      const Eigen::Vector3f offset = witnesses[n.witness].foot - position;
-      scratch.angles.push_back(std::atan2(offset.dot(across[1]), offset.dot(across[0])));
+      const Eigen::Vector3f offset = unfolded(position, normal, witnesses[n.witness]);
+      angles.push_back(std::atan2(offset.dot(across[1]), offset.dot(across[0])));
     }
-    if (scratch.angles.size() < 3) return false;
-    std::ranges::sort(scratch.angles);
-    double widest = scratch.angles.front() + 2.0 * std::numbers::pi - scratch.angles.back();
-    for (std::size_t i = 1; i < scratch.angles.size(); ++i) {
-      widest = std::max(widest, scratch.angles[i] - scratch.angles[i - 1]);
-    }
+    if (angles.size() < 3) return false;
+    std::ranges::sort(angles);
+    double widest = angles.front() + 2.0 * std::numbers::pi - angles.back();
+    for (std::size_t i = 1; i < angles.size(); ++i) widest = std::max(widest, angles[i] - angles[i - 1]);
     return widest < std::numbers::pi;
   }
 
-  /// `own_radius`: points so near belong to the place whatever their spacing.
-  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double own_radius,
+  /// The way from a place to where a point meets the surface; beyond an edge as if the other face were laid flat.
+  [[nodiscard]] static Eigen::Vector3f unfolded(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
+                                                const Witness& w) {
+    const Eigen::Vector3f offset = w.foot - position;
+    const float cosine = w.normal.dot(normal);
+    if (cosine > kSameSideCosine) return offset;
+    // Behind the place's plane beyond a convex edge, before it in a corner: both ways off the face.
+    return offset - offset.dot(normal) * (w.normal - cosine * normal).normalized();
+  }
+
+  [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, const Reaches& reaches,
                         Scratch& scratch) const {
     std::vector<Near>& near = scratch.near;
-    double reach = std::max(own_radius, 1.5 * spacing);
+    double reach = std::max(reaches.own_mm, 1.5 * spacing);
     gather(position, normal, reach, near);
     while (near.size() < kAround && 2.0 * reach < 8.0 * radius) {
       reach *= 2.0;
@@ -203,18 +243,25 @@ struct SpotFinder::Implementation {
     const float nearest =
         std::sqrt(std::min_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(last) + 1, by_distance)
                       ->squared_distance);
-    const bool surrounded = is_surrounded(position, normal, scratch, 4.0F * squared_around);
+    const float squared_view = 4.0F * squared_around;
+    const bool surrounded = is_surrounded(position, normal, near, squared_view, scratch.angles);
     // The area that the nearest points share; somewhat more than half of it when they lie to one side, as the disc then
     // reaches past them.
     const double area = (surrounded ? 1.0 : kHalfDisc) * std::numbers::pi * static_cast<double>(squared_around);
     const double local = std::min(std::sqrt(area / static_cast<double>(last + 1)), 4.0 * std::max(spacing, 1e-12));
-    if (static_cast<double>(nearest) > (surrounded ? kInnerReach : kOwnReach) * local) return {};
-    const auto mean_reach = static_cast<float>(std::max(own_radius, kMeanReach * local));
+    if (static_cast<double>(nearest) > (surrounded ? kInnerReach : reaches.at_edges) * local) return {};
+    if (!surrounded && static_cast<double>(nearest) > kOwnReach * local) {
+      // No rim if the scan goes on round an edge.
+      gather(position, normal, std::sqrt(static_cast<double>(squared_view)), scratch.round_edge, kRoundTheEdgeCosine);
+      if (!is_surrounded(position, normal, scratch.round_edge, squared_view, scratch.angles)) return {};
+    }
+    const auto mean_reach = static_cast<float>(std::max(reaches.own_mm, kMeanReach * local));
     std::erase_if(near, [&](const Near& n) { return n.squared_distance > mean_reach * mean_reach; });
     return near.empty() ? Spot{} : averaged(position, normal, scratch);
   }
 
-  [[nodiscard]] std::vector<Spot> all_at(const PointCloud& places, double own_radius, const Context& context) const;
+  [[nodiscard]] std::vector<Spot> all_at(const PointCloud& places, const Reaches& reaches,
+                                         const Context& context) const;
 
   [[nodiscard]] Spot averaged(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, Scratch& scratch) const {
     scratch.values.clear();
@@ -286,9 +333,10 @@ struct SpotFinder::Implementation {
 };
 
 SpotFinder::SpotFinder(const Measurement& measurement, const Pose& model_from_cloud, const Feet& feet,
-                       const model::PreparedModel& model, double radius_mm, double max_distance_mm)
+                       const model::PreparedModel& model, double radius_mm, double max_distance_mm,
+                       const Context& context)
     : implementation_(std::make_unique<const Implementation>(measurement, model_from_cloud, feet, model, radius_mm,
-                                                             max_distance_mm)) {}
+                                                             max_distance_mm, context)) {}
 SpotFinder::~SpotFinder() = default;
 SpotFinder::SpotFinder(SpotFinder&&) noexcept = default;
 SpotFinder& SpotFinder::operator=(SpotFinder&&) noexcept = default;
@@ -298,22 +346,23 @@ double SpotFinder::noise_sigma_mm() const { return implementation_->noise; }
 double SpotFinder::spacing_mm() const { return implementation_->spacing; }
 
 std::vector<Spot> SpotFinder::at(const PointCloud& places, const Context& context) const {
-  return implementation_->all_at(places, kOwnRadius * implementation_->radius, context);
+  return implementation_->all_at(places, {kOwnRadius * implementation_->radius, kEdgeReach}, context);
 }
 
 std::vector<Spot> SpotFinder::detailed_at(const PointCloud& places, const Context& context) const {
   const double radius = std::min(kOwnRadius * implementation_->radius, kDetailSpacings * implementation_->spacing);
-  return implementation_->all_at(places, radius, context);
+  // Vertices lie on the edges themselves, further from the last row than the surface beside them.
+  return implementation_->all_at(places, {radius, kInnerReach}, context);
 }
 
-std::vector<Spot> SpotFinder::Implementation::all_at(const PointCloud& places, double own_radius,
+std::vector<Spot> SpotFinder::Implementation::all_at(const PointCloud& places, const Reaches& reaches,
                                                      const Context& context) const {
   std::vector<Spot> spots(places.size());
   parallel_for_blocks(context, places.size(), 256, [&](std::size_t begin, std::size_t end) {
     if (context.cancelled()) return;
     Scratch scratch;
     for (std::size_t i = begin; i < end; ++i) {
-      spots[i] = at(places.positions[i], places.normals[i], own_radius, scratch);
+      spots[i] = at(places.positions[i], places.normals[i], reaches, scratch);
     }
   });
   return spots;
@@ -328,58 +377,23 @@ Peak SpotFinder::peak_near(const Eigen::Vector3f& position, const Eigen::Vector3
   constexpr std::size_t kLeast = 20;
   if (near.size() < kLeast) return peak;
 
-  using Vector = Eigen::Matrix<double, 6, 1>;
-  using Matrix = Eigen::Matrix<double, 6, 6>;
   const auto across = tangents(normal);
-  const auto row_of = [&](const Eigen::Vector2d& p) {
-    return Vector(1.0, p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y());
-  };
-  const auto place_of = [&](const Witness& w) {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<std::pair<std::uint16_t, std::uint32_t>> scans;
+  for (const Near& n : near) {
+    const Witness& w = implementation_->witnesses[n.witness];
     const Eigen::Vector3f offset = (w.foot - position) / static_cast<float>(reach_mm);
-    return Eigen::Vector2d(offset.dot(across[0]), offset.dot(across[1]));
-  };
-  Vector fit = Vector::Zero();
-  Matrix covariance = Matrix::Zero();
-  double scale = std::numeric_limits<double>::infinity();
-  for (int pass = 0; pass < 3; ++pass) {  // the later ones without what stands out
-    Matrix information = Matrix::Zero();
-    Vector moment = Vector::Zero();
-    std::vector<double> residuals;
-    std::vector<Vector> rows;
-    for (const Near& n : near) {
-      const Witness& w = implementation_->witnesses[n.witness];
-      const Vector row = row_of(place_of(w));
-      const double residual = static_cast<double>(w.deviation) - (pass == 0 ? 0.0 : row.dot(fit));
-      if (pass > 0 && std::abs(residual) > kOutlier * scale) continue;
-      information += row * row.transpose();
-      moment += static_cast<double>(w.deviation) * row;
-    }
-    const auto solver = information.ldlt();
-    if (solver.info() != Eigen::Success || !(solver.rcond() > 1e-9)) return peak;
-    fit = solver.solve(moment);
-    for (const Near& n : near) {
-      const Witness& w = implementation_->witnesses[n.witness];
-      residuals.push_back(std::abs(static_cast<double>(w.deviation) - row_of(place_of(w)).dot(fit)));
-    }
-    scale = std::max(1.4826 * median_of(residuals), 1e-9);
-    covariance = solver.solve(Matrix::Identity()) * scale * scale;
+    points.emplace_back(offset.cast<double>().dot(across[0].cast<double>()),
+                        offset.cast<double>().dot(across[1].cast<double>()), static_cast<double>(w.deviation));
+    Implementation::count_scan(scans, w.scan);
   }
-  // Where the paraboloid is highest, if it is a cap with its top nearby; else at the place itself.
-  Eigen::Vector2d top = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d bend;
-  bend << 2.0 * fit[3], fit[4], fit[4], 2.0 * fit[5];
-  const bool is_cap = -sign * bend(0, 0) > 0.0 && bend.determinant() > 1e-12 * bend.squaredNorm();
-  if (is_cap) {
-    top = -bend.inverse() * fit.segment<2>(1);
-    if (top.norm() > 0.5) top = Eigen::Vector2d::Zero();
-  }
-  const Vector row = row_of(top);
-  peak.deviation_mm = row.dot(fit);
-  const double own = std::sqrt(std::max(0.0, row.dot(covariance * row)));
-  peak.standard_error_mm = std::isfinite(peak.standard_error_mm) ? std::max(own, 0.5 * peak.standard_error_mm) : own;
-  const Eigen::Vector3f moved = static_cast<float>(reach_mm) *
-                                (static_cast<float>(top.x()) * across[0] + static_cast<float>(top.y()) * across[1]);
-  peak.point += moved.cast<double>();
+  const auto extremum = extremum_of_paraboloid(points, sign);
+  if (!extremum) return peak;
+  peak.deviation_mm = extremum->height;
+  peak.standard_error_mm = std::sqrt(
+      extremum->variance + implementation_->pose_variance(position, normal, scans, static_cast<double>(near.size())));
+  const Eigen::Vector2d moved = reach_mm * extremum->place;
+  peak.point += moved.x() * across[0].cast<double>() + moved.y() * across[1].cast<double>();
   return peak;
 }
 

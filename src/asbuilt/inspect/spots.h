@@ -39,7 +39,7 @@ class SpotFinder {
   /// Points further off the surface than `max_distance_mm`, and those whose own normal is turned against the face they
   /// meet, say nothing. `model_from_cloud` turns the cloud's normals. Keeps references to nothing but the poses.
   SpotFinder(const Measurement& measurement, const Pose& model_from_cloud, const Feet& feet,
-             const model::PreparedModel& model, double radius_mm, double max_distance_mm);
+             const model::PreparedModel& model, double radius_mm, double max_distance_mm, const Context& context);
   ~SpotFinder();
   SpotFinder(SpotFinder&&) noexcept;
   SpotFinder& operator=(SpotFinder&&) noexcept;

@@ -172,7 +172,7 @@ Result<void> save_prepared(const std::filesystem::path& path, const PreparedMode
   return io::write_file(path, std::string(kMagic) + header.bytes() + body + io::sha256(body));
 }
 
-Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Context& context) {
+Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Context& context, PreparedFor use) {
   ASBUILT_TRY(content, io::read_file(path));
   const auto refuse = [&](std::string_view what) {
     return fail(ErrorCode::unreadable_input, fmt::format("{}: {}", path.string(), what));
@@ -204,7 +204,11 @@ Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Con
   if (!read_body(body, model) || !is_consistent(model)) {
     return refuse("the prepared model contradicts itself; prepare it again");
   }
-  build_search_structures(model, context);
+  if (use == PreparedFor::inspection) {
+    build_inspection_structures(model);
+  } else {
+    build_search_structures(model, context);
+  }
   if (context.cancelled()) return fail(ErrorCode::cancelled, "the loading of the model was stopped");
   return model;
 }

@@ -105,19 +105,23 @@ Result<void> ModelOptions::validate() const {
   return {};
 }
 
-void build_search_structures(PreparedModel& model, const Context& context) {
+void build_inspection_structures(PreparedModel& model) {
   const TriangleMesh& skin = model.skin;
   model.box = bounding_box(skin);
-  const double area = surface_area(skin);
-  model.dense_sample_area_mm2 = area / static_cast<double>(model.dense_samples.size());
+  model.dense_sample_area_mm2 = surface_area(skin) / static_cast<double>(model.dense_samples.size());
   model.face_normals.resize(skin.triangles.size());
   for (std::size_t i = 0; i < skin.triangles.size(); ++i) {
     model.face_normals[i] = doubled_area_vector(skin, i).stableNormalized().cast<float>();
   }
-  model.rays = std::make_shared<const RayScene>(skin);
   model.surface = std::make_shared<const SurfaceDistance>(skin);
+}
+
+void build_search_structures(PreparedModel& model, const Context& context) {
+  build_inspection_structures(model);
+  const TriangleMesh& skin = model.skin;
+  model.rays = std::make_shared<const RayScene>(skin);
   model.report.thin_wall = thin_wall(model.samples, *model.rays, model.diameter);
-  const double voxel = choose_voxel(model.diameter, area, model.report.thin_wall);
+  const double voxel = choose_voxel(model.diameter, surface_area(skin), model.report.thin_wall);
   const double reach = std::max(kReach * model.diameter, 3.0 * model.sampling_distance);
   model.field = std::make_shared<const DistanceField>(skin, *model.surface, voxel, reach, context);
 }

@@ -5,7 +5,6 @@
 
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/mesh_file.h"
-#include "asbuilt/model/prepared_file.h"
 
 namespace asbuilt::pipeline {
 
@@ -27,7 +26,8 @@ Result<model::PreparedModel> prepared_from_file(const std::string& path, std::st
 
 }  // namespace
 
-Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context) {
+Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context,
+                               model::PreparedFor use) {
   std::string sha256;
   {
     ASBUILT_TRY(content, io::FileContent::open(path));
@@ -36,7 +36,7 @@ Result<LoadedModel> load_model(const std::string& path, const Options& options, 
   }
   LoadedModel loaded;
   ASBUILT_TRY(prepared, model::is_prepared_file(path)
-                            ? model::load_prepared(path, context)
+                            ? model::load_prepared(path, context, use)
                             : prepared_from_file(path, sha256, options, loaded.unit, context));
   for (const std::string& note : prepared.report.notes) context.warn(fmt::format("{}: {}", path, note));
   // A prepared model is the same model as the mesh it came from.

@@ -7,6 +7,7 @@
 #include "asbuilt/core/result.h"
 #include "asbuilt/io/run_record.h"
 #include "asbuilt/io/unit.h"
+#include "asbuilt/model/prepared_file.h"
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/pipeline/options.h"
 
@@ -20,7 +21,9 @@ struct LoadedModel {
 };
 
 /// Reads MODEL: a mesh or CAD surfaces, which are prepared, or a prepared model as `asbuilt prepare` writes it (then
-/// `options.model` and the unit were decided when it was written). Errors: unreadable_input, not_possible, cancelled.
-[[nodiscard]] Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context);
+/// `options.model` and the unit were decided when it was written, and `use` says what of it is needed). Errors:
+/// unreadable_input, not_possible, cancelled.
+[[nodiscard]] Result<LoadedModel> load_model(const std::string& path, const Options& options, const Context& context,
+                                             model::PreparedFor use = model::PreparedFor::everything);
 
 }  // namespace asbuilt::pipeline

@@ -8,17 +8,20 @@
 #include "asbuilt/core/result.h"
 #include "asbuilt/pipeline/load_model.h"
 #include "asbuilt/pipeline/options.h"
+#include "asbuilt/pipeline/point_columns.h"
 #include "asbuilt/report/report.h"
 
 namespace asbuilt::pipeline {
 
 /// What `asbuilt inspect` measures.
 struct MeasuredCloud {
-  PointCloud cloud;  ///< in the model frame, mm
+  PointCloud cloud;      ///< in the model frame, mm
+  PointColumns columns;  ///< what a reconstruction.ply says of its points; empty for other clouds
   report::InputFile file;
 };
 
-/// The points of a cloud, or even samples of a mesh. Errors: unreadable_input.
+/// The points of a cloud, or even samples of a mesh; of a reconstruction also what it says of each point. Errors:
+/// unreadable_input.
 [[nodiscard]] Result<MeasuredCloud> measured_cloud(const std::string& path, const LoadedModel& model,
                                                    const Options& options, const Context& context);
 

@@ -18,6 +18,7 @@ class CloudColumns {
   explicit CloudColumns(const PointCloud& cloud) : count_(cloud.has_normals() ? 6 : 3) {
     for (std::size_t column = 0; column < count_; ++column) {
       const auto& vectors = column < 3 ? cloud.positions : cloud.normals;
+      values_[column].reserve(vectors.size());
       for (const Eigen::Vector3f& v : vectors) values_[column].push_back(v[static_cast<Eigen::Index>(column % 3)]);
     }
   }

@@ -251,6 +251,27 @@ TEST(InspectProperty, MorePointsNeverTakeCoverageAway) {
   }
 }
 
+// The outermost rows lie most of a spacing away from the edges. Where the scan goes on beyond the edge that is no rim;
+// where it does not, a rim reaches half a spacing further than the points.
+TEST(InspectProperty, AScanThatGoesRoundTheEdgesLeavesNoGreyAlongThem) {
+  constexpr double kStep = 2.0, kFromEdge = 0.8 * kStep;
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    Random random(seed, "edges", 0);
+    PointCloud all, top;
+    for (int side = 0; side < 6; ++side) {
+      add_side(all, side / 2, side % 2 == 1, 0.0, kStep, kFromEdge - 0.5 * kStep, random);
+    }
+    add_side(top, 2, true, 0.0, kStep, kFromEdge - 0.5 * kStep, random);
+    EXPECT_GE(inspected(all, cube()).coverage, 0.99) << "seed " << seed;
+    const auto share = [&](double beyond) {  // of the square that reaches so far out of the last rows
+      return std::pow((kEdge - 2.0 * (kFromEdge - beyond)) / kEdge, 2) / 6.0;
+    };
+    const double coverage = inspected(top, cube()).coverage;
+    EXPECT_GE(coverage, share(0.0)) << "seed " << seed;
+    EXPECT_LE(coverage, share(0.6 * kStep)) << "seed " << seed;
+  }
+}
+
 TEST(InspectProperty, OneWallOfAThinPlateSaysNothingAboutTheOther) {
   for (const double thickness : {0.4, 1.0, 3.0}) {
     const model::PreparedModel plate = prepared(test::joined(test::box({0, 0, 0}, {kEdge, kEdge, thickness}, 8)));

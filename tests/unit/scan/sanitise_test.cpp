@@ -5,6 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
+#include <tuple>
+
+#include "asbuilt/core/random.h"
 
 namespace asbuilt::scan {
 namespace {
@@ -75,6 +79,23 @@ TEST(Sanitise, TheCountsAddUpOnARandomMixture) {
     EXPECT_EQ(clean.cloud.positions[i], raw.positions[clean.source_index[i]]);
   }
   EXPECT_TRUE(std::ranges::is_sorted(clean.source_index));
+}
+
+TEST(Sanitise, KeepsTheFirstOfEveryRepeatAmongManyPointsWhateverTheThreads) {
+  Random random(5, "many", 0);
+  PointCloud raw;
+  const auto coordinate = [&] { return static_cast<float>(1 + random.below(60)); };
+  for (int i = 0; i < 200000; ++i) raw.positions.emplace_back(coordinate(), coordinate(), coordinate());
+  std::set<std::tuple<float, float, float>> seen;
+  std::vector<std::uint32_t> first;
+  for (std::uint32_t i = 0; i < raw.size(); ++i) {
+    const Eigen::Vector3f& p = raw.positions[i];
+    if (seen.emplace(p.x(), p.y(), p.z()).second) first.push_back(i);
+  }
+  ASSERT_LT(first.size(), 150000U);
+  for (const int threads : {1, 2, 3}) {
+    EXPECT_EQ(sanitise(raw, Context(threads)).source_index, first) << threads << " threads";
+  }
 }
 
 TEST(Sanitise, OfNothingIsNothing) {
