@@ -63,9 +63,9 @@ void add_scan(FileInfo& info, const io::ScanFile& file, const Context& context) 
   info.notes.insert(info.notes.end(), file.notes.begin(), file.notes.end());
   const std::size_t removed = file.cloud.size() - sane.cloud.size();
   if (removed > 0) {
-    info.notes.push_back(fmt::format("{}: {} unusable points ({} not finite, {} without return, {} duplicates)",
-                                     file.name, removed, sane.report.not_finite, sane.report.no_return,
-                                     sane.report.duplicates));
+    info.notes.push_back(fmt::format("{}: {} unusable point{} ({} not finite, {} without return, {} duplicates)",
+                                     file.name, removed, removed == 1 ? "" : "s", sane.report.not_finite,
+                                     sane.report.no_return, sane.report.duplicates));
   }
 }
 
@@ -111,7 +111,9 @@ void describe_model(FileInfo& info, const io::ModelFile& model) {
   info.notes.insert(info.notes.end(), model.notes.begin(), model.notes.end());
   if (!model.is_cad) return;
   info.points = 0;  // surfaces have none
-  info.notes.push_back(fmt::format("{} CAD faces of {} bodies, here as triangles", model.cad_faces, model.cad_parts));
+  info.notes.push_back(fmt::format("{} CAD face{} of {}, here as triangles", model.cad_faces,
+                                   model.cad_faces == 1 ? "" : "s",
+                                   model.cad_parts == 1 ? "one body" : fmt::format("{} bodies", model.cad_parts)));
 }
 
 Result<void> describe(FileInfo& info, const Arguments& arguments, const Context& context) {

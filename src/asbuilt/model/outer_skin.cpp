@@ -28,8 +28,9 @@ struct HiddenGroup {
   bool touches_visible = false;
 };
 
-// What hides next to visible faces stays if it is a pinhole or sees a little: the walls of a bore, the bottom of a
-// groove. A scanner may well catch some of it, and without it the skin would be open and the distance lose its sign.
+// What hides next to plainly visible faces stays if it is a pinhole or sees a little on the whole: the walls of a bore,
+// the bottom of a groove. A scanner may well catch some of it, and without it the skin would be open and the distance
+// lose its sign. `keep` comes with the plainly visible faces.
 void keep_bores_and_pinholes(const TriangleMesh& mesh, const std::vector<FaceVisibility>& visibility,
                              std::vector<std::uint8_t>& keep) {
   const std::vector<EdgeSide> sides = sorted_sides(mesh);
@@ -163,8 +164,11 @@ std::size_t turn_outwards(TriangleMesh& mesh, const std::vector<FaceVisibility>&
 OuterSkin outer_skin(const TriangleMesh& mesh, const std::vector<FaceVisibility>& visibility, bool keep_inner) {
   std::vector<std::uint8_t> keep(mesh.triangles.size(), 1);
   if (!keep_inner) {
-    for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = visibility[i].is_visible ? 1 : 0;
+    for (std::size_t i = 0; i < keep.size(); ++i) keep[i] = visibility[i].is_visible && !visibility[i].is_dim ? 1 : 0;
     keep_bores_and_pinholes(mesh, visibility, keep);
+    for (std::size_t i = 0; i < keep.size(); ++i) {
+      if (visibility[i].is_visible) keep[i] = 1;
+    }
   }
   OuterSkin skin;
   std::vector<FaceVisibility> kept_visibility;

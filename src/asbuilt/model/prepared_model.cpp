@@ -133,12 +133,14 @@ Result<PreparedModel> prepare(const TriangleMesh& mesh, const ModelOptions& opti
   context.report_progress(0.1);
 
   const RayScene rays(clean_mesh.mesh);
-  const std::vector<FaceVisibility> visibility =
-      face_visibility(clean_mesh.mesh, rays, {options.occlusion_threshold, options.occlusion_rays}, context);
+  const VisibilityOptions looking{options.occlusion_threshold, options.occlusion_rays};
+  const SeenMesh seen = options.keep_inner
+                            ? SeenMesh{clean_mesh.mesh, face_visibility(clean_mesh.mesh, rays, looking, context)}
+                            : split_where_covered(clean_mesh.mesh, rays, looking, context);
   if (context.cancelled()) return cancelled();
   context.report_progress(0.4);
 
-  OuterSkin skin = outer_skin(clean_mesh.mesh, visibility, options.keep_inner);
+  OuterSkin skin = outer_skin(seen.mesh, seen.visibility, options.keep_inner);
   if (skin.mesh.empty()) {
     return fail(ErrorCode::not_possible,
                 fmt::format("none of the model's {} faces can be seen from outside at an occlusion threshold of {}; "
