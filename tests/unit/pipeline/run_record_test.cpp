@@ -35,7 +35,8 @@ RunRecord example() {
   scan.covariance = Matrix6d::Identity() / 3.0;
   scan.component = 0;
   scan.hold_sigma = {50.0, 0.1, 1.0 / 3.0, 0.01, 0.01, 0.01};
-  scan.loose_motions = {{true, Eigen::Vector3d::UnitX(), {0.1, 2.0, 3.0}, 50.0, true}, {}};
+  scan.loose_motions.resize(2);
+  scan.loose_motions[0] = {true, Eigen::Vector3d::UnitX(), {0.1, 2.0, 3.0}, 50.0, true};
   scan.score = 0.1 + 0.2;
   scan.candidates.push_back({});
   scan.candidates.push_back({});
