@@ -36,7 +36,10 @@ RunRecord example() {
   scan.component = 0;
   scan.hold_sigma = {50.0, 0.1, 1.0 / 3.0, 0.01, 0.01, 0.01};
   scan.loose_motions.resize(2);
-  scan.loose_motions[0] = {true, Eigen::Vector3d::UnitX(), {0.1, 2.0, 3.0}, 50.0, true};
+  MotionRecord& turn = scan.loose_motions.front();
+  turn.is_turn = turn.unheld = true;
+  turn.through << 0.1, 2.0, 3.0;
+  turn.sigma = 50.0;
   scan.score = 0.1 + 0.2;
   scan.candidates.push_back({});
   scan.candidates.push_back({});
@@ -50,7 +53,7 @@ RunRecord example() {
   record.scans = {scan, ScanRecord{}};
   record.graph = GraphRecord{{{0, 1, 0.25, true}}, {{0, 1}}};
   record.refinement = {RefinementRecord{}};
-  record.refinement->front().links = {{0, 1, {0.1, 1.0 / 3.0}, {{false, Eigen::Vector3d::UnitY(), {}, 0.0, false}}}};
+  record.refinement->front().links = {{0, 1, {0.1, 1.0 / 3.0}, {{false, Eigen::Vector3d::UnitY(), Eigen::Vector3d::Zero(), 0.0, false}}}};
   record.deviation = DeviationRecord{0.1, 0.2, 0.3, 0.4, std::nullopt, 0.5, "fail"};
   return record;
 }
