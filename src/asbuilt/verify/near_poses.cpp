@@ -37,7 +37,58 @@ class NearPoses {
     return poses;
   }
 
+  [[nodiscard]] std::vector<Pose> turned_in_box() const {
+    constexpr std::size_t kMost = 24;
+    struct Turned {
+      Pose motion;
+      double share;
+    };
+    std::vector<Turned> turned;
+    for (const Eigen::Matrix3d& rotation : cube_rotations()) {
+      Eigen::AlignedBox3d seen;
+      for (const Eigen::Vector3f& point : on_model_) seen.extend(rotation * point.cast<double>());
+      for (int corner = 0; corner < 8; ++corner) {
+        Eigen::Vector3d shift;
+        for (int axis = 0; axis < 3; ++axis) {
+          const bool is_high = ((corner >> axis) & 1) != 0;
+          shift[axis] = is_high ? model_.box.max()[axis] - seen.max()[axis] : model_.box.min()[axis] - seen.min()[axis];
+        }
+        Pose motion = Pose::Identity();
+        motion.linear() = rotation;
+        motion.translation() = shift;
+        const double share = share_that_stays(motion);
+        if (share >= kStayingShare && makes_another_pose(motion)) turned.push_back({motion, share});
+      }
+    }
+    std::ranges::stable_sort(turned, std::ranges::greater{}, &Turned::share);
+    std::vector<Pose> motions;
+    for (const Turned& candidate : turned) {
+      if (motions.size() == kMost) break;
+      const bool is_new = std::ranges::all_of(
+          motions, [&](const Pose& other) { return makes_another_pose(candidate.motion * other.inverse()); });
+      if (is_new) motions.push_back(candidate.motion);
+    }
+    for (Pose& motion : motions) motion = motion * pose_;
+    return motions;
+  }
+
  private:
+  // But for the identity.
+  [[nodiscard]] static std::vector<Eigen::Matrix3d> cube_rotations() {
+    std::vector<Eigen::Matrix3d> rotations;
+    for (int x = 0; x < 6; ++x) {
+      for (int y = 0; y < 6; ++y) {
+        if (x / 2 == y / 2 || (x == 0 && y == 2)) continue;
+        Eigen::Matrix3d rotation;
+        rotation.col(0) = (x % 2 == 0 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(x / 2);
+        rotation.col(1) = (y % 2 == 0 ? 1.0 : -1.0) * Eigen::Vector3d::Unit(y / 2);
+        rotation.col(2) = rotation.col(0).cross(rotation.col(1));
+        rotations.push_back(rotation);
+      }
+    }
+    return rotations;
+  }
+
   [[nodiscard]] float distance(const Eigen::Vector3f& point_in_model) const {
     return std::abs(model_.field->at(point_in_model).distance);
   }
@@ -125,6 +176,13 @@ std::vector<Pose> near_poses(const Pose& model_from_scan, std::span<const Eigen:
                              const model::PreparedModel& model, double distance_mm) {
   if (!model.symmetry.has_near()) return {};
   return NearPoses(model_from_scan, points_in_scan, model, distance_mm).all();
+}
+
+std::vector<Pose> turned_in_box(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
+                                const model::PreparedModel& model, double distance_mm) {
+  constexpr std::size_t kEnough = 1000;
+  const auto few = points_in_scan.first(std::min(kEnough, points_in_scan.size()));
+  return NearPoses(model_from_scan, few, model, distance_mm).turned_in_box();
 }
 
 std::vector<Vector6d> free_twists(const model::PreparedModel& model) {

@@ -19,6 +19,13 @@ namespace asbuilt::verify {
 [[nodiscard]] std::vector<Pose> near_poses(const Pose& model_from_scan, std::span<const Eigen::Vector3f> points_in_scan,
                                            const model::PreparedModel& model, double distance_mm);
 
+/// The poses that put the part's box into another of its 23 attitudes, flush with the scan points that lie on the model
+/// (within `distance_mm`), as far as most of these stay on it; the best 24. What shows only one flat face or an extrusion
+/// fits other sides of the part as well, where the rest of them is hidden.
+[[nodiscard]] std::vector<Pose> turned_in_box(const Pose& model_from_scan,
+                                              std::span<const Eigen::Vector3f> points_in_scan,
+                                              const model::PreparedModel& model, double distance_mm);
+
 /// Unit twists, as the rows of PoseEvidence::information measure them, that the part's symmetry makes invisible: one of
 /// a part of revolution, three of a sphere.
 [[nodiscard]] std::vector<Vector6d> free_twists(const model::PreparedModel& model);

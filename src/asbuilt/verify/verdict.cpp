@@ -45,8 +45,16 @@ double edge_measurements_needed(const Candidate& c, const VerifyOptions& options
   return c.without_rays ? kWithoutRays * needed : needed;
 }
 
+// Of a single flat face, only the outline tells the part from others with such a face, its mirror image among them: the
+// face must be a good deal of the part, as it is of a plate.
+bool is_a_mere_face(const Candidate& c) {
+  constexpr int kOfAPlane = 3;
+  constexpr double kLeastFacing = 0.35;
+  return c.loose_directions >= kOfAPlane && c.facing_share < kLeastFacing;
+}
+
 bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
-  return c.slip_lead >= edge_measurements_needed(c, options) &&
+  return !is_a_mere_face(c) && c.slip_lead >= edge_measurements_needed(c, options) &&
          c.contradiction_share <= 0.75 * options.max_contradiction_share;
 }
 
@@ -106,6 +114,12 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
             fmt::format("the scan denies {:.1f} % of the claimed surface, and the surface goes on past {:.0f} % of the "
                         "part's edges: each is allowed, but not both",
                         100.0 * c.contradiction_share, 100.0 * c.overrun_share)};
+  }
+  if (!options.paper_mode && !is_held(c, options) && is_a_mere_face(c)) {
+    return {Reason::under_constrained,
+            fmt::format("one flat face is all that was found; it makes up {:.0f} % of the part, too little for its "
+                        "outline to prove a pose",
+                        100.0 * c.facing_share)};
   }
   if (!options.paper_mode && !is_held(c, options)) {
     return {Reason::under_constrained,
@@ -221,7 +235,9 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     std::optional<PoseContrast> contrast;
     if (compare) contrast = compare(best, rival);
     const Outcome outcome = contrast ? winner(*contrast, options) : Outcome::undecided;
-    const bool leads = best.support - rival.support >= options.min_margin * best.support;
+    // Along what only edges hold, a little more surface is found at a wrong pose as easily as at the right one.
+    const bool is_firm = best.weakest_direction >= options.min_weakest_direction;
+    const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
       continue;

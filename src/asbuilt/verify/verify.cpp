@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 
@@ -84,40 +85,43 @@ std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<
 }
 
 // A quick look carries fewer candidates along: what it does not settle is looked at again.
-std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance, Look look) {
+// The published pyramid takes all points and samples of a level; ours no more than a pose needs.
+std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance, Look look, bool paper_mode) {
+  const auto most = [&](std::size_t ours) { return paper_mode ? std::numeric_limits<std::size_t>::max() : ours; };
   const double d = model.sampling_distance;
   const std::size_t third = look == Look::quick ? 4 : look == Look::thorough ? 8 : 16;
   const std::size_t second = 2 * third, first = look == Look::quick ? 16 : 5 * third;
-  return {{{0.8 * d,
-            {2.0 * d, d},
-            std::max(0.5 * d, final_distance),
-            500,
-            500,
-            first,
-            &model.samples,
-            1.0,
-            kFewRimProbes,
-            false},
-           {0.5 * d,
-            {0.7 * d, 0.4 * d},
-            std::max(0.25 * d, final_distance),
-            1000,
-            1000,
-            second,
-            &model.samples,
-            2.0,
-            kSomeRimProbes,
-            true},
-           {0.3 * d,
-            {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-            final_distance,
-            3000,
-            3000,
-            third,
-            &model.dense_samples,
-            kContradictionWeight,
-            kSomeRimProbes,
-            true}}};
+  const Level coarse{.spacing_mm = 0.8 * d,
+                     .robust_scale_mm = {2.0 * d, d},
+                     .score_distance_mm = std::max(0.5 * d, final_distance),
+                     .most_points = most(500),
+                     .most_samples = most(500),
+                     .survivors = first,
+                     .model_samples = &model.samples,
+                     .contradiction_weight = 1.0,
+                     .most_rim_probes = kFewRimProbes,
+                     .is_precise = false};
+  const Level middle{.spacing_mm = 0.5 * d,
+                     .robust_scale_mm = {0.7 * d, 0.4 * d},
+                     .score_distance_mm = std::max(0.25 * d, final_distance),
+                     .most_points = most(1000),
+                     .most_samples = most(1000),
+                     .survivors = second,
+                     .model_samples = &model.samples,
+                     .contradiction_weight = 2.0,
+                     .most_rim_probes = kSomeRimProbes,
+                     .is_precise = true};
+  const Level fine{.spacing_mm = 0.3 * d,
+                   .robust_scale_mm = {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
+                   .score_distance_mm = final_distance,
+                   .most_points = most(3000),
+                   .most_samples = most(3000),
+                   .survivors = third,
+                   .model_samples = &model.dense_samples,
+                   .contradiction_weight = kContradictionWeight,
+                   .most_rim_probes = kSomeRimProbes,
+                   .is_precise = true};
+  return {coarse, middle, fine};
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -195,7 +199,7 @@ class Judge::Verification {
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
   [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates, Look look) const {
-    for (const Level& level : pyramid(model_, final_distance_, look)) {
+    for (const Level& level : pyramid(model_, final_distance_, look, options_.paper_mode)) {
       const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
@@ -210,16 +214,21 @@ class Judge::Verification {
   [[nodiscard]] std::vector<Candidate> with_near_poses(std::vector<Candidate> candidates) const {
     constexpr std::size_t kMostLeaders = 3, kMostNear = 8, kMostPoints = 4000;
     constexpr double kLeaderShare = 0.7, kPromisingShare = 0.7;  // of the best support
-    if (options_.paper_mode || candidates.empty() || !model_.symmetry.has_near()) return candidates;
+    if (options_.paper_mode || candidates.empty()) return candidates;
     const double best_support = candidates.front().support;
-    const Level level = pyramid(model_, final_distance_, Look::thorough).back();
+    const Level level = pyramid(model_, final_distance_, Look::thorough, options_.paper_mode).back();
     const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
     std::vector<Candidate> near;
     for (std::size_t i = 0; i < std::min(kMostLeaders, candidates.size()); ++i) {
       if (candidates[i].support < kLeaderShare * best_support) break;
       const std::vector<Eigen::Vector3f> around =
           points_around(shuffled_foreground_, candidates[i].model_from_scan, model_, final_distance_, kMostPoints);
-      for (const Pose& pose : near_poses(candidates[i].model_from_scan, around, model_, final_distance_)) {
+      std::vector<Pose> poses = near_poses(candidates[i].model_from_scan, around, model_, final_distance_);
+      if (i == 0 && candidates[i].weakest_direction < options_.min_weakest_direction) {
+        std::ranges::copy(turned_in_box(candidates[i].model_from_scan, around, model_, final_distance_),
+                          std::back_inserter(poses));
+      }
+      for (const Pose& pose : poses) {
         near.push_back(candidates[i]);
         near.back().model_from_scan = pose;
       }
@@ -228,6 +237,7 @@ class Judge::Verification {
       if (!context_.cancelled()) refine_at(level, points, near[i]);
     });
     std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
+    if (near.empty()) return candidates;
     near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
     candidates.insert(candidates.end(), near.begin(), near.end());
     candidates =
@@ -259,14 +269,15 @@ class Judge::Verification {
   // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
   void register_densely(Candidate& candidate) const {
     make_canonical(candidate);
-    constexpr std::size_t kMostPoints = 8000;  // the noise of so many averages out below a field's voxel
-    constexpr std::size_t kFewPoints = 2000;   // enough to come close
+    constexpr std::size_t kEnough = 8000;     // the noise of so many averages out below a field's voxel
+    constexpr std::size_t kFewPoints = 2000;  // enough to come close
+    const std::size_t most_points = options_.paper_mode ? std::numeric_limits<std::size_t>::max() : kEnough;
     constexpr int kFewIterations = 30, kManyIterations = 300;
     const std::vector<Eigen::Vector3f> around =
-        points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, kMostPoints);
+        points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, most_points);
     bool has_converged = false;
-    const auto register_at = [&](double scale_mm, int most_iterations, std::size_t most_points) {
-      const auto points = std::span(around).first(std::min(most_points, around.size()));
+    const auto register_at = [&](double scale_mm, int most_iterations, std::size_t most) {
+      const auto points = std::span(around).first(std::min(most, around.size()));
       const LmIcpResult result = lm_icp(points, candidate.model_from_scan, model_, scan_.viewpoint,
                                         {scale_mm, most_iterations, only_facing()});
       candidate.model_from_scan = result.model_from_scan;
@@ -275,7 +286,7 @@ class Judge::Verification {
       has_converged = result.iterations < most_iterations;
     };
     register_at(1.5 * final_distance_, kFewIterations, kFewPoints);
-    register_at(final_distance_, kFewIterations, kMostPoints);
+    register_at(final_distance_, kFewIterations, most_points);
     const EvidenceOptions options{final_distance_, lateral(final_distance_)};
     const auto judged_densely = [&] {
       return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
@@ -286,7 +297,7 @@ class Judge::Verification {
              candidate.contradiction_share <= kClearly * options_.max_contradiction_share;
     };
     if (is_plausible() && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
-      register_at(final_distance_, kManyIterations, kMostPoints);
+      register_at(final_distance_, kManyIterations, most_points);
       evidence = judged_densely();
     }
     const auto is_loose = [&] {
@@ -512,7 +523,8 @@ Result<void> VerifyOptions::validate() const {
 
 Result<Detection> Judge::Verification::verdict_on(std::vector<Candidate> candidates, Look look,
                                                   bool accept_anyway) const {
-  candidates = contenders(with_near_poses(coarse_to_fine(std::move(candidates), look)));
+  candidates = with_near_poses(coarse_to_fine(std::move(candidates), look));
+  candidates = contenders(with_near_poses(std::move(candidates)));  // of what came to the front, too
   parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
     if (!context_.cancelled()) register_densely(candidates[i]);
   });

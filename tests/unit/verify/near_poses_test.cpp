@@ -39,6 +39,35 @@ TEST(NearPoses, OfAPartWithoutNearSymmetryAreNone) {
   EXPECT_TRUE(near_poses(test::pose_at({0, 0, 600}).inverse(), scan.cloud.positions, model, 0.7).empty());
 }
 
+// Of an angle of 120 x 80 mm, the outer 80 mm of the wide leg and one end are in sight: they fit the narrow leg as
+// well.
+TEST(TurnedInBox, OfAnAngleHalfSeenIsTheOtherLeg) {
+  const TriangleMesh mesh = simulate::l_profile(120.0, 80.0, 12.0, 300.0);
+  const model::PreparedModel model = test::prepared(mesh, 0.04);
+  const Eigen::Vector3d low = model.box.min(), high = model.box.max();
+  ASSERT_NEAR(high.x() - low.x(), 120.0, 0.1);
+  ASSERT_NEAR(high.y() - low.y(), 80.0, 0.1);
+  const Pose scan_from_model = test::pose_at({0, 0, 600}), pose = scan_from_model.inverse();
+  std::vector<Eigen::Vector3f> seen;
+  for (double x = high.x() - 80.0; x <= high.x(); x += 4.0) {
+    for (double z = low.z(); z <= 0.0; z += 4.0) {
+      seen.push_back((scan_from_model * Eigen::Vector3d(x, low.y(), z)).cast<float>());
+    }
+  }
+  // The mirror image in the legs' bisector, turned end for end: (x, y, z) goes to (y, x - 40, -z), from the corner.
+  Pose swapped = Pose::Identity();
+  swapped.linear() << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  swapped.translation() << low.x() - low.y(), low.y() - low.x() - 40.0, low.z() + high.z();
+  EXPECT_TRUE(has_pose(turned_in_box(pose, seen, model, 0.7), swapped * pose, model));
+  for (const Pose& turned : turned_in_box(pose, seen, model, 0.7)) {
+    EXPECT_GT(displacement_modulo_mm(turned, pose, model), 0.05 * model.diameter);
+    const auto on_model = std::ranges::count_if(seen, [&](const Eigen::Vector3f& point) {
+      return std::abs(model.field->at((turned * point.cast<double>()).cast<float>()).distance) < 2.0F;
+    });
+    EXPECT_GE(static_cast<double>(on_model), 0.75 * static_cast<double>(seen.size()));
+  }
+}
+
 PoseEvidence evidence_of(const scan::Scan& scan, const Pose& pose, const model::PreparedModel& model) {
   const ScanEvidence asked(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
   return evidence_for(pose, model.dense_samples, model, asked, {0.7, std::max(0.7, 2.5 * scan.spacing_mm)});

@@ -92,6 +92,31 @@ TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradi
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
 }
 
+TEST(Verdict, TheOutlineOfOneFaceProvesAPlateButNotABlock) {
+  Candidate candidate = flawless();
+  candidate.weakest_direction = 0.0, candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
+  candidate.loose_directions = 3, candidate.facing_share = 0.45;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.facing_share = 0.25;
+  const Detection detection = decide({candidate}, block(), {});
+  EXPECT_EQ(detection.reason, Reason::under_constrained);
+  EXPECT_THAT(detection.explanation, testing::HasSubstr("25 %"));
+  candidate.loose_directions = 1;  // two faces along one edge
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
+  Candidate best = flawless(), rival = flawless();
+  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * block().diameter, 0, 0));
+  rival.support = 0.9 * best.support;
+  const Comparison undecided = [](const Candidate&, const Candidate&) { return PoseContrast{3.0, 2.0}; };
+  EXPECT_EQ(decide({best, rival}, block(), {}, undecided).status, Status::accepted);
+  for (Candidate* candidate : {&best, &rival}) {
+    candidate->weakest_direction = 0.0, candidate->explained_measurements = 1000.0, candidate->slip_lead = 500.0;
+  }
+  EXPECT_EQ(decide({best, rival}, block(), {}, undecided).reason, Reason::ambiguous_pose);
+}
+
 TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
