@@ -417,7 +417,7 @@ class Judge::Verification {
     double most_support = 0.0;
     for (const Candidate& candidate : candidates) most_support = std::max(most_support, candidate.support);
     const auto doubts = [&](const Candidate& c) {
-      if (c.overrun_share > options_.max_overrun_share) return 2;
+      if (c.overrun_share > kClearly * options_.max_overrun_share) return 2;
       if (!level.is_precise) return 0;
       if (c.contradiction_share > kClearly * options_.max_contradiction_share) return 2;
       const bool has_little = c.support < kLittle * most_support;

@@ -34,7 +34,7 @@ struct VerifyOptions {
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
   double near_equal_ratio = 0.01;  ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
-  double max_overrun_share = 0.2;  ///< of the edges past which the scan's surface may go on
+  double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
       1.5;  ///< contradictions and overrun, each as a share of its limit, together: right poses reach at most 1.2
   double max_normal_angle_deg = 30.0;  ///< normals closer than this agree

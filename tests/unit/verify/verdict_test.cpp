@@ -135,7 +135,7 @@ TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
   };
   EXPECT_TRUE(is_beyond_doubt(judged([](Candidate&) {}), {}));
   const std::vector<std::function<void(Candidate&)>> flaws{
-      [](Candidate& c) { c.contradiction_share = 0.02; }, [](Candidate& c) { c.overrun_share = 0.15; },
+      [](Candidate& c) { c.contradiction_share = 0.02; }, [](Candidate& c) { c.overrun_share = 0.1; },
       [](Candidate& c) { c.weakest_direction = 0.004; },
       [](Candidate& c) { c.residual_ratio = 0.3, c.normal_agreement = 0.8; }};
   for (const auto& spoil : flaws) {
@@ -168,7 +168,7 @@ TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
   Candidate candidate = flawless();
   candidate.contradiction_share = 0.028;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.overrun_share = 0.15;
+  candidate.overrun_share = 0.09;
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
   candidate.contradiction_share = 0.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
@@ -176,9 +176,9 @@ TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
 
 TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
   Candidate candidate = flawless();
-  candidate.score = 0.75, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.39
+  candidate.score = 0.72, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.376
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.overrun_share = 0.18;  // allowed by itself; 0.39 * 0.82 = 0.32
+  candidate.overrun_share = 0.11;  // allowed by itself; 0.376 * 0.89 = 0.335
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
