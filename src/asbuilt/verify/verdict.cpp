@@ -235,8 +235,10 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     std::optional<PoseContrast> contrast;
     if (compare) contrast = compare(best, rival);
     const Outcome outcome = contrast ? winner(*contrast, options) : Outcome::undecided;
-    // Along what only edges hold, a little more surface is found at a wrong pose as easily as at the right one.
-    const bool is_firm = best.weakest_direction >= options.min_weakest_direction;
+    // Along what hardly more than edges hold, a little more surface is found at a wrong pose as easily as at the right
+    // one.
+    constexpr double kTwice = 2.0;
+    const bool is_firm = best.weakest_direction >= kTwice * options.min_weakest_direction;
     const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
