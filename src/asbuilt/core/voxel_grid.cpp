@@ -5,6 +5,7 @@
 #include <array>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/result.h"
 
@@ -93,9 +94,7 @@ double median_spacing(std::span<const Eigen::Vector3f> points, const KdTree& tre
     tree.nearest(points[i], 2, neighbours);
     distances.push_back(neighbours[1].squared_distance);
   }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return std::sqrt(static_cast<double>(*middle));
+  return std::sqrt(static_cast<double>(median_of(std::move(distances))));
 }
 
 }  // namespace asbuilt

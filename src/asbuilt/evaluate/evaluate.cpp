@@ -8,6 +8,7 @@
 #include <map>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/evaluate/reconstruction_error.h"
 #include "asbuilt/evaluate/surface_error.h"
@@ -162,11 +163,9 @@ Result<void> judge_reconstruction(Evaluation& evaluation, const PartPoints& poin
     evaluation.oracle_beyond_share = points_beyond(moved(points.truth, truth), far_mm, surface, context).share();
   }
   if (points.spacings_mm.empty()) return {};
-  std::vector<double> spacings_mm = points.spacings_mm;
-  const auto middle = spacings_mm.begin() + static_cast<std::ptrdiff_t>(spacings_mm.size() / 2);
-  std::ranges::nth_element(spacings_mm, middle);
   evaluation.reconstruction_completeness =
-      completeness(cloud, moved(points.reference, truth), kReachInSpacings * *middle, as_built, surface, context);
+      completeness(cloud, moved(points.reference, truth), kReachInSpacings * median_of(points.spacings_mm), as_built,
+                   surface, context);
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/fuse/mesh_clean.h"
 #include "asbuilt/fuse/mesh_field.h"
 #include "asbuilt/fuse/mesh_grid.h"
@@ -40,11 +41,9 @@ Result<void> check(const PointCloud& cloud) {
 }
 
 double median_sigma(const Reconstruction& reconstruction) {
-  std::vector<float> sigma = reconstruction.sigma_mm;
-  if (sigma.empty()) return 0.0;
-  const auto middle = sigma.begin() + static_cast<std::ptrdiff_t>(sigma.size() / 2);
-  std::ranges::nth_element(sigma, middle);
-  return std::isfinite(*middle) ? static_cast<double>(*middle) : 0.0;
+  if (reconstruction.sigma_mm.empty()) return 0.0;
+  const float sigma = median_of(reconstruction.sigma_mm);
+  return std::isfinite(sigma) ? static_cast<double>(sigma) : 0.0;
 }
 
 Result<void> check_cell(double cell_mm, const FieldSamples& samples) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
 
@@ -43,13 +44,6 @@ Neighbourhood measured(const PointCloud& cloud, std::size_t i, std::span<const K
     count += 1.0F;
   }
   return {std::sqrt(last * std::numbers::pi_v<float> / count), std::sqrt(0.5F * squares / count)};
-}
-
-template <class Value>
-double median_of(std::vector<Value> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
 }
 
 // What is measured around each sample, and the samples it was measured from.
@@ -103,7 +97,7 @@ double noise_of(const PointCloud& cloud, const KdTree& tree, double sigma, doubl
     for (std::size_t i = step / 2; i < cloud.size(); i += step) {
       sigmas.push_back(sigma_around(cloud, i, tree, 6.0 * sigma, neighbours));
     }
-    const double found = median_of(std::move(sigmas));
+    const auto found = static_cast<double>(median_of(std::move(sigmas)));
     if (found < 1.02 * sigma) return std::max(found, sigma);
     sigma = found;
   }
@@ -216,8 +210,9 @@ FieldSamples field_samples(const PointCloud& cloud, double known_sigma_mm, doubl
   const KdTree tree(samples.cloud.positions);
   const Surroundings around = surroundings(samples.cloud, tree, context);
   if (context.cancelled()) return samples;
-  const double local_spacing = median_of(around.spacing);
-  const double noise = std::max(known_sigma_mm, noise_of(samples.cloud, tree, median_of(around.sigma), local_spacing));
+  const auto local_spacing = static_cast<double>(median_of(around.spacing));
+  const auto local_sigma = static_cast<double>(median_of(around.sigma));
+  const double noise = std::max(known_sigma_mm, noise_of(samples.cloud, tree, local_sigma, local_spacing));
   samples.base_width_mm = std::max({local_spacing, kWidthInSigmas * noise, kWidthInCells * cell_mm});
   const auto base = static_cast<float>(samples.base_width_mm);
   samples.width_mm.resize(cloud.size());

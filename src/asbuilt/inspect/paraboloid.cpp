@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "asbuilt/core/median.h"
+
 namespace asbuilt::inspect {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr double kOutlier = 3.5;      // robust sigmas
 constexpr double kFurthestTop = 0.5;  // beyond, it is told from one side only
 
 Vector row_of(const Eigen::Vector2d& p) { return {1.0, p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y()}; }
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 Eigen::Vector2d top_of(const Vector& fit, double sign) {
   Eigen::Matrix2d bend;
@@ -55,7 +51,7 @@ std::optional<Extremum> extremum_of_paraboloid(std::span<const Eigen::Vector3d> 
     std::vector<double> residuals;
     residuals.reserve(points.size());
     for (const Eigen::Vector3d& p : points) residuals.push_back(std::abs(p.z() - row_of(p.head<2>()).dot(fit)));
-    scale = std::max(1.4826 * median_of(residuals), 1e-9);
+    scale = std::max(1.4826 * median_of(std::move(residuals)), 1e-9);
     covariance = solver.solve(Matrix::Identity()) * scale * scale;
   }
   const Eigen::Vector2d top = top_of(fit, sign);

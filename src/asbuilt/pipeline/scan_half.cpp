@@ -7,6 +7,7 @@
 #include <new>
 #include <utility>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/pipeline/as_detected.h"
@@ -270,9 +271,7 @@ double spacing_of_found(const io::RunRecord& record) {
     const bool found = scan.status == io::ScanStatus::accepted || scan.status == io::ScanStatus::ambiguous;
     if (found && scan.spacing > 0.0) spacings.push_back(scan.spacing);
   }
-  if (spacings.empty()) return 0.0;
-  std::ranges::nth_element(spacings, spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2));
-  return spacings[spacings.size() / 2];
+  return spacings.empty() ? 0.0 : median_of(std::move(spacings));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::refine {
@@ -146,12 +147,7 @@ ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const
     residuals.push_back(std::abs(normal_q.dot(p - to.points.positions[match.target].cast<double>())));
     sines.push_back(normal_p.cross(normal_q).norm());
   }
-  const auto median = [](std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  return {1.4826 * median(residuals), median(sines)};
+  return {1.4826 * median_of(std::move(residuals)), median_of(std::move(sines))};
 }
 
 }  // namespace asbuilt::refine

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/robust.h"
 #include "asbuilt/refine/sampled_view.h"
@@ -129,9 +130,7 @@ class GaugeFit {
       if (residual.used) distances.push_back(std::abs(residual.distance));
     }
     if (distances.empty()) return 0.0;
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    return 1.4826 * *middle;
+    return 1.4826 * median_of(std::move(distances));
   }
 
   // A point off reach or on the wrong side costs as much as one beyond the loss: losing points never looks like a gain.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/refine/sampled_view.h"
@@ -139,10 +140,9 @@ std::optional<ContradictedView> contradicted_view(int view_count, std::span<cons
     }
     if (static_cast<int>(others.size()) < kMinOthers) continue;
     if (largest_group_without(view, view_count, evidence) < kMinOthers) continue;
-    const auto middle = others.begin() + static_cast<std::ptrdiff_t>(others.size() / 2);
-    std::nth_element(others.begin(), middle, others.end());
-    if (own.share() <= kTimesUsual * *middle + kMoreThanUsual) continue;
-    if (!worst || own.share() > worst->share) worst = ContradictedView{view, own.share(), *middle};
+    const double usual = median_of(std::move(others));
+    if (own.share() <= kTimesUsual * usual + kMoreThanUsual) continue;
+    if (!worst || own.share() > worst->share) worst = ContradictedView{view, own.share(), usual};
   }
   return worst;
 }

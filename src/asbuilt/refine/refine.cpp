@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/refine/correspondences.h"
 #include "asbuilt/refine/normal_equations.h"
@@ -81,13 +82,6 @@ int view_with_most_points(std::span<const View> views) {
   const auto most = std::ranges::max_element(
       views, {}, [](const View& view) { return view.segment_in_scan.size(); });  // the first of equals
   return static_cast<int>(most - views.begin());
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The refinement of one component; the functions below are its steps in the order in which they happen.
@@ -189,7 +183,7 @@ class JointRefinement {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       if (!edges_[e].matches.empty()) scales.push_back(std::max(statistics[e].scale_mm, scale_floor(edges_[e])));
     }
-    usual_scale_ = median_of(scales);
+    usual_scale_ = scales.empty() ? 0.0 : median_of(std::move(scales));
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       const double own = std::max(statistics[e].scale_mm, scale_floor(edges_[e]));
       const double scale = options_.anneal ? std::min(own, kMaxScaleRatio * usual_scale_) : usual_scale_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/median.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -14,12 +15,6 @@ namespace {
 constexpr std::size_t kMinCandidates = 50;  // fewer say nothing about an edge
 constexpr double kWorseThanUsual = 3.0, kWorseThanWorst = 2.0, kConsistent = 1.5;
 constexpr int kMinOthers = 3, kMinNeighbours = 2;
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // Size of the largest group of views, `without` left out, that edges of at most `limit` hold together.
 int largest_consistent_group(int view_count, std::span<const EdgeResidual> edges, int without, double limit) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/io/json_text.h"
 #include "asbuilt/report/report_json.h"
 
@@ -69,12 +70,7 @@ Json significance_json(const ReportInput& input) {
   for (const inspect::Spot& spot : input.deviations.spots) {
     if (std::isfinite(spot.standard_error_mm)) errors.push_back(static_cast<double>(spot.standard_error_mm));
   }
-  Json middle = nullptr;
-  if (!errors.empty()) {
-    const auto half = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::ranges::nth_element(errors, half);
-    middle = json_number(*half);
-  }
+  const Json middle = errors.empty() ? Json(nullptr) : json_number(median_of(std::move(errors)));
   // Two-sided, of a normal error.
   const double confidence = std::erf(input.options.significance / std::sqrt(2.0));
   return {{"confidence", json_number(confidence)},

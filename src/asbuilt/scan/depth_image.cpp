@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/result.h"
 
 namespace asbuilt::scan {
@@ -20,9 +21,7 @@ double median_range(std::span<const Eigen::Vector3f> points, const Eigen::Vector
   std::vector<double> ranges;
   const std::size_t step = std::max<std::size_t>(1, points.size() / 5000);
   for (std::size_t i = 0; i < points.size(); i += step) ranges.push_back((points[i].cast<double>() - from).norm());
-  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
-  std::nth_element(ranges.begin(), middle, ranges.end());
-  return *middle;
+  return median_of(std::move(ranges));
 }
 
 }  // namespace

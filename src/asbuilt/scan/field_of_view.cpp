@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/result.h"
 
 namespace asbuilt::scan {
@@ -143,12 +144,6 @@ std::vector<Line> shown_sides(const Image& image) {
   return best.shown;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 // No finer than the image is wide in cells at most.
 double cell_of(const std::vector<Vector2d>& places, double spacing) {
   Vector2d low = places.front(), high = low;
@@ -194,7 +189,7 @@ FieldOfView::FieldOfView(std::span<const Eigen::Vector3f> points_in_scan, double
       if (!(depth > kWidest * ranges.back())) return;
       image.places.emplace_back(ray.dot(u) / depth, ray.dot(v) / depth);
     }
-    image.cell = cell_of(image.places, spacing_mm / std::max(median(std::move(ranges)), 1e-9));
+    image.cell = cell_of(image.places, spacing_mm / std::max(median_of(std::move(ranges)), 1e-9));
   }
   for (const Line& side : shown_sides(image)) {
     const Eigen::Vector3d across = side.outwards.x() * u + side.outwards.y() * v;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::scan {
@@ -97,9 +98,7 @@ double estimate_noise(std::span<const Eigen::Vector3f> points, const KdTree& tre
       residuals[i] = quadric_residual(points, neighbours);
     }
   });
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(probes / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  return *middle;
+  return median_of(std::move(residuals));
 }
 
 std::size_t neighbours_for_normals(double noise_sigma_mm, double spacing_mm) {

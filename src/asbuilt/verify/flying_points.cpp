@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/median.h"
 #include "asbuilt/scan/face_normals.h"
 #include "asbuilt/scan/face_support.h"
 
@@ -19,9 +20,7 @@ constexpr double kTilt = 0.05;        // radians; a coarser scan fits its faces 
 float scale_of(std::span<const float> deviation_mm, double noise_sigma_mm) {
   std::vector<float> absolute(deviation_mm.size());
   std::ranges::transform(deviation_mm, absolute.begin(), [](float value) { return std::abs(value); });
-  const auto middle = absolute.begin() + static_cast<std::ptrdiff_t>(absolute.size() / 2);
-  std::ranges::nth_element(absolute, middle);
-  return std::max(1.4826F * *middle, static_cast<float>(noise_sigma_mm));
+  return std::max(1.4826F * median_of(std::move(absolute)), static_cast<float>(noise_sigma_mm));
 }
 
 // The points `at` and their neighbours, ascending, each once.
