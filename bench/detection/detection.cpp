@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "../program.h"
 #include "asbuilt/io/file.h"
 #include "cases.h"
 #include "curves.h"
@@ -177,10 +177,5 @@ int run(int argc, char** argv) {
 }  // namespace asbuilt::bench
 
 int main(int argc, char** argv) {
-  try {
-    return asbuilt::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "asbuilt_detection: %s\n", error.what());
-    return 1;
-  }
+  return asbuilt::bench::run_program("asbuilt_detection", asbuilt::bench::run, argc, argv);
 }

@@ -6,9 +6,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <nlohmann/json.hpp>
 
+#include "../program.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/run_record.h"
 #include "figures.h"
@@ -154,10 +154,5 @@ int run(int argc, char** argv) {
 }  // namespace asbuilt::bench
 
 int main(int argc, char** argv) {
-  try {
-    return asbuilt::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "asbuilt_measure: %s\n", error.what());
-    return 1;
-  }
+  return asbuilt::bench::run_program("asbuilt_measure", asbuilt::bench::run, argc, argv);
 }

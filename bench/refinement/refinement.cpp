@@ -4,11 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "../program.h"
 #include "peer.h"
 #include "summary.h"
 #include "trial.h"
@@ -182,10 +182,5 @@ int run(int argc, char** argv) {
 }  // namespace asbuilt::bench
 
 int main(int argc, char** argv) {
-  try {
-    return asbuilt::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "asbuilt_refinement: {}\n", error.what());
-    return 1;
-  }
+  return asbuilt::bench::run_program("asbuilt_refinement", asbuilt::bench::run, argc, argv);
 }

@@ -6,11 +6,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "../program.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/model/prepared_model.h"
 #include "brute_visibility.h"
@@ -166,10 +166,5 @@ int run(int argc, char** argv) {
 }  // namespace asbuilt::bench
 
 int main(int argc, char** argv) {
-  try {
-    return asbuilt::bench::run(argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "asbuilt_skin_bench: {}\n", error.what());
-    return 1;
-  }
+  return asbuilt::bench::run_program("asbuilt_skin_bench", asbuilt::bench::run, argc, argv);
 }
