@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
-#include "asbuilt/model/surface_search.h"
 
 namespace asbuilt::inspect {
 namespace {
@@ -21,12 +21,11 @@ Result<void> check_share(std::string_view name, double value) {
 /// The feet after the alignment that was asked for, which needs those before it.
 Result<Feet> aligned_feet(const Measurement& measurement, const model::PreparedModel& model,
                           const InspectOptions& options, Alignment& alignment, const Context& context) {
-  const model::SurfaceSearch surface(model.skin);
-  ASBUILT_TRY(feet, feet_of(measurement.cloud, Pose::Identity(), model, surface, context));
+  ASBUILT_TRY(feet, feet_of(measurement.cloud, Pose::Identity(), model, context));
   ASBUILT_TRY(found, aligned(measurement, feet, model, options.alignment, context));
   alignment = std::move(found);
   if (alignment.method == AlignmentMethod::as_given) return std::move(feet);
-  return feet_of(measurement.cloud, alignment.model_from_given, model, surface, context);
+  return feet_of(measurement.cloud, alignment.model_from_given, model, context);
 }
 
 /// Statistics, with the shares counted value by value, since each may have its own tolerance.
@@ -112,9 +111,7 @@ Tolerance limits_from(std::span<const Spot> spots) {
     if (spot.is_scanned()) magnitudes.push_back(std::abs(static_cast<double>(spot.deviation_mm)));
   }
   if (magnitudes.empty()) return {};
-  const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
-  std::ranges::nth_element(magnitudes, middle);
-  const double limit = 3.0 * 1.4826 * *middle;
+  const double limit = 3.0 * 1.4826 * median_of(std::move(magnitudes));
   return {-limit, limit};
 }
 

@@ -42,7 +42,7 @@ std::size_t end_of_run(std::span<const Eigen::Vector3d> points, std::size_t begi
 }  // namespace
 
 Result<Feet> feet_of(const PointCloud& cloud, const Pose& model_from_cloud, const model::PreparedModel& model,
-                     const model::SurfaceSearch& surface, const Context& context) {
+                     const Context& context) {
   Feet feet;
   feet.points.resize(cloud.size());
   feet.deviation_mm.resize(cloud.size());
@@ -51,6 +51,7 @@ Result<Feet> feet_of(const PointCloud& cloud, const Pose& model_from_cloud, cons
   const CubeRows cubes(cloud.positions, edge);
   const auto order = cubes.order();
   ASBUILT_EXPECT(order.size() == cloud.size(), "a cloud of finite points");
+  const model::SurfaceSearch& surface = model.surface->search();
   const std::size_t blocks = (order.size() + kGrain - 1) / kGrain;
   std::vector<std::size_t> on_open_edges(blocks, 0);
   parallel_for_blocks(context, order.size(), kGrain, [&](std::size_t begin, std::size_t end) {

@@ -15,6 +15,8 @@ SurfaceDistance::~SurfaceDistance() = default;
 SurfaceDistance::SurfaceDistance(SurfaceDistance&&) noexcept = default;
 SurfaceDistance& SurfaceDistance::operator=(SurfaceDistance&&) noexcept = default;
 
+const SurfaceSearch& SurfaceDistance::search() const { return implementation_->search; }
+
 SurfaceDistance::Nearest SurfaceDistance::nearest(const Eigen::Vector3d& point, double max_distance) const {
   if (!point.allFinite() || !(max_distance >= 0.0)) return {};
   return implementation_->search.nearest(point, max_distance * max_distance);

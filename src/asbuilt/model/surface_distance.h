@@ -11,6 +11,8 @@
 
 namespace asbuilt::model {
 
+class SurfaceSearch;
+
 /// Exact distance from a point to a triangle mesh, in double. Built once, then const and safe from any thread.
 ///
 /// The sign is that of the angle-weighted pseudonormal of the nearest feature (face, edge or vertex; Baerentzen and
@@ -38,6 +40,9 @@ class SurfaceDistance {
 
   /// As nearest(point), faster if `guess` is the nearest triangle of a point close by. The answer is the same.
   [[nodiscard]] Nearest nearest_from_guess(const Eigen::Vector3d& point, std::uint32_t guess) const;
+
+  /// What stands behind it, for callers that have many points.
+  [[nodiscard]] const SurfaceSearch& search() const;
 
  private:
   struct Implementation;
