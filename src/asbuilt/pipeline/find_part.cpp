@@ -67,27 +67,23 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     return found;
   }
 
-  // The more hypotheses are tried, the sooner one of them passes by chance.
-  verify::VerifyOptions strict = options.verify;
-  strict.max_contradiction_share *= 0.5;
-  strict.max_overrun_share *= 0.5;
   std::optional<verify::Judge> judge;
   Result<verify::Detection> detection;
-  const auto judge_all = [&](verify::Look look, const verify::VerifyOptions& limits) {
+  const auto judge_all = [&](verify::Look look) {
     timed("verify", [&] {
-      if (!judge) judge.emplace(scan, model, limits, context, std::span<const std::uint8_t>(), &sampled);
+      if (!judge) judge.emplace(scan, model, options.verify, context, std::span<const std::uint8_t>(), &sampled);
       detection = judge->verdict_on(found.hypotheses, look);
     });
   };
   if (first > 0 && first < all) {
     ASBUILT_CHECK(propose(first, kAnyVotes, options.detect.first_hypotheses));
-    judge_all(verify::Look::quick, options.verify);
+    judge_all(verify::Look::quick);
     if (!detection) return tl::unexpected(detection.error());
   }
   if (found.looks == 0 || !verify::is_beyond_doubt(*detection, options.verify)) {
     ASBUILT_CHECK(propose(all, kAnyVotes, options.detect.max_hypotheses));
     if (found.looks > 1) add_candidates(*detection, found.hypotheses);
-    judge_all(verify::Look::thorough, options.verify);
+    judge_all(verify::Look::thorough);
     if (!detection) return tl::unexpected(detection.error());
   }
   // In a hall, hardly any of the reference points so far need lie on the part.
@@ -97,8 +93,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
   if (detection->status == verify::Status::rejected && last > all && may_go_on) {
     ASBUILT_CHECK(propose(last, most_votes, options.detect.last_hypotheses));
     add_candidates(*detection, found.hypotheses);
-    judge.reset();
-    judge_all(verify::Look::patient, strict);
+    judge_all(verify::Look::patient);
     if (!detection) return tl::unexpected(detection.error());
   }
   found.placements.push_back(std::move(*detection));

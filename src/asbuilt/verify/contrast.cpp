@@ -5,34 +5,12 @@
 #include <cmath>
 #include <optional>
 
+#include "asbuilt/verify/sensor_in_model.h"
+
 namespace asbuilt::verify {
 namespace {
 
 constexpr double kClearlyNearer = 0.5;  // of the distance that counts as on the model
-
-// Rules out, without a look at the distance field, most of what cosine_if_seen() would.
-class TurnedToSensor {
- public:
-  TurnedToSensor(const scan::Viewpoint& viewpoint, const Pose& model_from_scan, bool two_sided)
-      : kind_(viewpoint.kind), two_sided_(two_sided) {
-    if (kind_ == scan::Viewpoint::Kind::point) place_ = (model_from_scan * viewpoint.value).cast<float>();
-    if (kind_ == scan::Viewpoint::Kind::direction) place_ = -(model_from_scan.linear() * viewpoint.value).cast<float>();
-  }
-
-  bool operator()(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
-    constexpr float kRounding = 0.99F;
-    constexpr auto kLeast = kRounding * static_cast<float>(kGrazing);
-    if (kind_ == scan::Viewpoint::Kind::none) return true;
-    const Eigen::Vector3f towards = kind_ == scan::Viewpoint::Kind::point ? Eigen::Vector3f(place_ - point) : place_;
-    const float along = normal.dot(towards);
-    return (two_sided_ || along > 0.0F) && along * along >= kLeast * kLeast * towards.squaredNorm();
-  }
-
- private:
-  scan::Viewpoint::Kind kind_;
-  bool two_sided_;
-  Eigen::Vector3f place_ = Eigen::Vector3f::Zero();  // of the sensor in the model frame, or the direction towards it
-};
 
 class Contrast {
  public:
@@ -55,9 +33,9 @@ class Contrast {
     const Pose scan_from_own = own_from_scan.inverse();
     const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
     const PointCloud& samples = model_.dense_samples;
-    const TurnedToSensor is_turned(scan_.scan.viewpoint, own_from_scan, model_.is_open());
+    const SensorInModel sensor(scan_.scan.viewpoint, own_from_scan);
     for (std::size_t i = 0; i < asked_; ++i) {
-      if (!is_turned(samples.positions[i], samples.normals[i])) continue;
+      if (is_ruled_out(sensor, samples.positions[i], samples.normals[i])) continue;
       const double apart = distance_at(other_from_own * samples.positions[i]);
       if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
@@ -69,6 +47,14 @@ class Contrast {
   }
 
  private:
+  // Most of what cosine_if_seen() would rule out, before the distance field is asked.
+  [[nodiscard]] bool is_ruled_out(const SensorInModel& sensor, const Eigen::Vector3f& point,
+                                  const Eigen::Vector3f& normal) const {
+    constexpr auto kLeast = 0.99F * static_cast<float>(kGrazing);  // less, for rounding
+    if (!sensor.known() || sensor.is_turned(point, normal, kLeast)) return false;
+    return !(model_.is_open() && sensor.is_turned(point, -normal, kLeast));
+  }
+
   [[nodiscard]] double distance_at(const Eigen::Vector3f& point_in_model) const {
     return std::abs(static_cast<double>(model_.field->at(point_in_model).distance));
   }

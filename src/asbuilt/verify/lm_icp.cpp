@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asbuilt/core/robust.h"
+#include "asbuilt/verify/sensor_in_model.h"
 
 namespace asbuilt::verify {
 namespace {
@@ -43,27 +44,6 @@ class PackedInformation {
   std::array<double, 21> sum_{};
 };
 
-// The sensor in the model frame of one pose: asks which walls are turned to it without a root per point.
-class SensorInModel {
- public:
-  SensorInModel(const scan::Viewpoint& viewpoint, const Pose& model_from_scan, bool is_asked)
-      : kind_(is_asked ? viewpoint.kind : scan::Viewpoint::Kind::none) {
-    if (kind_ == scan::Viewpoint::Kind::point) place_ = (model_from_scan * viewpoint.value).cast<float>();
-    if (kind_ == scan::Viewpoint::Kind::direction) place_ = -(model_from_scan.linear() * viewpoint.value).cast<float>();
-  }
-
-  [[nodiscard]] bool sees(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
-    if (kind_ == scan::Viewpoint::Kind::none) return true;
-    const Eigen::Vector3f towards = kind_ == scan::Viewpoint::Kind::point ? Eigen::Vector3f(place_ - point) : place_;
-    const float along = normal.dot(towards);
-    return along > 0.0F || along * along < kAway * kAway * towards.squaredNorm();
-  }
-
- private:
-  scan::Viewpoint::Kind kind_;
-  Eigen::Vector3f place_ = Eigen::Vector3f::Zero();  // position, or direction towards it
-};
-
 class Problem {
  public:
   Problem(std::span<const Eigen::Vector3f> points, const model::PreparedModel& model, const scan::Viewpoint& viewpoint,
@@ -78,7 +58,8 @@ class Problem {
   [[nodiscard]] NormalEquations evaluate(const Pose& pose) const {
     NormalEquations sum;
     PackedInformation information;
-    const SensorInModel sensor(viewpoint_, pose, options_.only_facing);
+    const SensorInModel sensor(viewpoint_, pose);
+    const bool asks_sensor = options_.only_facing && sensor.known();
     const double outlier_cost = loss_.value(loss_.scale * loss_.scale);
     const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     const Eigen::Vector3f translation = pose.translation().cast<float>();
@@ -86,7 +67,8 @@ class Problem {
       const Eigen::Vector3f moved = rotation * point + translation;
       const model::DistanceField::Sample sample = model_.field->at(moved);
       if (!sample.known() || std::abs(sample.distance) >= loss_.scale ||
-          !sensor.sees(moved, model_.face_normals[static_cast<std::size_t>(sample.triangle)])) {
+          (asks_sensor &&
+           !sensor.is_turned(moved, model_.face_normals[static_cast<std::size_t>(sample.triangle)], kAway))) {
         sum.cost += outlier_cost;
         continue;
       }

@@ -70,9 +70,9 @@ double score_distance(const scan::Scan& scan, const model::PreparedModel& model,
 }
 
 // Floors, walls and tables larger than the part would lend their points to any flat face of it.
-std::vector<std::uint8_t> background(const scan::Scan& scan, const model::PreparedModel& model,
-                                     const VerifyOptions& options, const Context& context,
-                                     const detect::SampledScan* sampled) {
+std::vector<std::uint8_t> background_of(const scan::Scan& scan, const model::PreparedModel& model,
+                                        const VerifyOptions& options, const Context& context,
+                                        const detect::SampledScan* sampled) {
   if (options.paper_mode) return std::vector<std::uint8_t>(scan.cloud.size(), 0);
   if (sampled != nullptr) return detect::points_on_large_planes(scan, *sampled, context);
   return detect::points_on_large_planes(
@@ -82,6 +82,15 @@ std::vector<std::uint8_t> background(const scan::Scan& scan, const model::Prepar
 std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<std::uint8_t> background) {
   for (std::size_t i = 0; i < taken.size(); ++i) background[i] |= taken[i];
   return background;
+}
+
+// The more hypotheses are tried, the sooner one of them passes by chance.
+VerifyOptions limits_of(VerifyOptions options, Look look) {
+  constexpr double kOfMany = 0.5;
+  if (look != Look::patient) return options;
+  options.max_contradiction_share *= kOfMany;
+  options.max_overrun_share *= kOfMany;
+  return options;
 }
 
 // A quick look carries fewer candidates along: what it does not settle is looked at again.
@@ -178,22 +187,52 @@ void take_evidence(Candidate& candidate, const PoseEvidence& evidence, const mod
 
 }  // namespace
 
+// What a scan is asked by, whatever the question.
+struct Judge::Material {
+  Material(const scan::Scan& the_scan, const model::PreparedModel& the_model, const VerifyOptions& the_options,
+           const Context& the_context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled)
+      : scan(the_scan),
+        model(the_model),
+        options(the_options),
+        context(the_context),
+        background(background_of(scan, model, options, context, sampled)),
+        evidence(scan, with(taken, background)),
+        measurements_per_sample(verify::measurements_per_sample(model, scan)),
+        final_distance(score_distance(scan, model, options)),
+        shuffled_foreground(shuffled(evidence.foreground.cloud.positions)),
+        rim_reach(std::max(kRimReach * model.diameter, 2.0 * final_distance)),
+        rim_probes(verify::rim_probes(model, rim_reach, kMostRimSamples)),
+        one_of_several(!taken.empty()) {}
+
+  const scan::Scan& scan;
+  const model::PreparedModel& model;
+  const VerifyOptions& options;
+  const Context& context;
+  std::vector<std::uint8_t> background;
+  ScanEvidence evidence;
+  double measurements_per_sample;
+  double final_distance;
+  std::vector<Eigen::Vector3f> shuffled_foreground;
+  double rim_reach;
+  std::vector<RimProbe> rim_probes;
+  bool one_of_several;
+};
+
 class Judge::Verification {
  public:
-  Verification(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options,
-               const Context& context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled)
-      : scan_(scan),
-        model_(model),
-        options_(options),
-        context_(context),
-        background_(background(scan, model, options, context, sampled)),
-        evidence_(scan, with(taken, background_)),
-        measurements_per_sample_(measurements_per_sample(model, scan)),
-        final_distance_(score_distance(scan, model, options)),
-        shuffled_foreground_(shuffled(evidence_.foreground.cloud.positions)),
-        rim_reach_(std::max(kRimReach * model.diameter, 2.0 * final_distance_)),
-        rim_probes_(rim_probes(model, rim_reach_, kMostRimSamples)),
-        one_of_several_(!taken.empty()) {}
+  Verification(const Material& material, Look look)
+      : scan_(material.scan),
+        model_(material.model),
+        options_(limits_of(material.options, look)),
+        context_(material.context),
+        background_(material.background),
+        evidence_(material.evidence),
+        measurements_per_sample_(material.measurements_per_sample),
+        final_distance_(material.final_distance),
+        shuffled_foreground_(material.shuffled_foreground),
+        rim_reach_(material.rim_reach),
+        rim_probes_(material.rim_probes),
+        one_of_several_(material.one_of_several) {}
 
   [[nodiscard]] Result<Detection> verdict_on(std::vector<Candidate> candidates, Look look, bool accept_anyway) const;
 
@@ -210,40 +249,26 @@ class Judge::Verification {
   }
 
   // Detection may have taken the part for one of its near-symmetric poses, so the best bring theirs along. Those that
-  // stand up to a first look are registered and judged as all others.
-  [[nodiscard]] std::vector<Candidate> with_near_poses(std::vector<Candidate> candidates) const {
-    constexpr std::size_t kMostLeaders = 3, kMostNear = 8, kMostPoints = 4000;
-    constexpr double kLeaderShare = 0.7, kPromisingShare = 0.7;  // of the best support
-    if (options_.paper_mode || candidates.empty()) return candidates;
+  // stand up to a first look are registered and judged as all others. Says whether there are any.
+  [[nodiscard]] bool add_near_poses(std::vector<Candidate>& candidates) const {
+    constexpr std::size_t kMostNear = 8;
+    constexpr double kPromisingShare = 0.7;  // of the best support
+    std::vector<Candidate> near = near_candidates(candidates);
+    if (near.empty()) return false;
     const double best_support = candidates.front().support;
     const Level level = pyramid(model_, final_distance_, Look::thorough, options_.paper_mode).back();
     const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
-    std::vector<Candidate> near;
-    for (std::size_t i = 0; i < std::min(kMostLeaders, candidates.size()); ++i) {
-      if (candidates[i].support < kLeaderShare * best_support) break;
-      const std::vector<Eigen::Vector3f> around =
-          points_around(shuffled_foreground_, candidates[i].model_from_scan, model_, final_distance_, kMostPoints);
-      std::vector<Pose> poses = near_poses(candidates[i].model_from_scan, around, model_, final_distance_);
-      if (i == 0 && candidates[i].weakest_direction < options_.min_weakest_direction) {
-        std::ranges::copy(turned_in_box(candidates[i].model_from_scan, around, model_, final_distance_),
-                          std::back_inserter(poses));
-      }
-      for (const Pose& pose : poses) {
-        near.push_back(candidates[i]);
-        near.back().model_from_scan = pose;
-      }
-    }
     parallel_for(context_, near.size(), 1, [&](std::size_t i) {
       if (!context_.cancelled()) refine_at(level, points, near[i]);
     });
     std::erase_if(near, [&](const Candidate& c) { return c.support < kPromisingShare * best_support; });
-    if (near.empty()) return candidates;
-    near = best_different(std::move(near), kMostNear, kSamePose * model_.diameter, model_, options_);
+    if (near.empty()) return false;
+    const double apart = kSamePose * model_.diameter;
+    near = best_different(std::move(near), kMostNear, apart, model_, options_);
     candidates.insert(candidates.end(), near.begin(), near.end());
-    candidates =
-        best_different(std::move(candidates), candidates.size(), kSamePose * model_.diameter, model_, options_);
+    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
     put_refuted_last(level, candidates);
-    return candidates;
+    return true;
   }
 
   // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
@@ -341,6 +366,31 @@ class Judge::Verification {
   }
 
  private:
+  // The near-symmetric poses of the best candidates; of the first, if it is loose, those in other attitudes too.
+  [[nodiscard]] std::vector<Candidate> near_candidates(const std::vector<Candidate>& candidates) const {
+    constexpr std::size_t kMostLeaders = 3, kMostPoints = 4000;
+    constexpr double kLeaderShare = 0.7;  // of the best support
+    std::vector<Candidate> near;
+    if (options_.paper_mode || candidates.empty()) return near;
+    const bool is_loose = candidates.front().weakest_direction < options_.min_weakest_direction;
+    const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : is_loose ? 1 : 0;
+    for (std::size_t i = 0; i < std::min(leaders, candidates.size()); ++i) {
+      if (candidates[i].support < kLeaderShare * candidates.front().support) break;
+      const Pose& pose = candidates[i].model_from_scan;
+      const std::vector<Eigen::Vector3f> around =
+          points_around(shuffled_foreground_, pose, model_, final_distance_, kMostPoints);
+      std::vector<Pose> poses = near_poses(pose, around, model_, final_distance_);
+      if (i == 0 && is_loose) {
+        std::ranges::copy(turned_in_box(pose, around, model_, final_distance_), std::back_inserter(poses));
+      }
+      for (const Pose& there : poses) {
+        near.push_back(candidates[i]);
+        near.back().model_from_scan = there;
+      }
+    }
+    return near;
+  }
+
   // Of the poses into which the part may have slipped that which comes closest, or one that explains the scan better.
   [[nodiscard]] Slip strongest_rival(const Pose& model_from_scan, const PoseEvidence& evidence,
                                      std::span<const Eigen::Vector3f> points_in_scan,
@@ -485,15 +535,15 @@ class Judge::Verification {
 
   const scan::Scan& scan_;
   const model::PreparedModel& model_;
-  const VerifyOptions& options_;
+  VerifyOptions options_;
   const Context& context_;
-  std::vector<std::uint8_t> background_;
-  ScanEvidence evidence_;
+  const std::vector<std::uint8_t>& background_;
+  const ScanEvidence& evidence_;
   double measurements_per_sample_;
   double final_distance_;
-  std::vector<Eigen::Vector3f> shuffled_foreground_;
+  const std::vector<Eigen::Vector3f>& shuffled_foreground_;
   double rim_reach_;
-  std::vector<RimProbe> rim_probes_;
+  const std::vector<RimProbe>& rim_probes_;
   bool one_of_several_;
 };
 
@@ -523,8 +573,11 @@ Result<void> VerifyOptions::validate() const {
 
 Result<Detection> Judge::Verification::verdict_on(std::vector<Candidate> candidates, Look look,
                                                   bool accept_anyway) const {
-  candidates = with_near_poses(coarse_to_fine(std::move(candidates), look));
-  candidates = contenders(with_near_poses(std::move(candidates)));  // of what came to the front, too
+  candidates = coarse_to_fine(std::move(candidates), look);
+  constexpr int kRounds = 2;  // the second for what the first brought to the front
+  for (int round = 0; round < kRounds && add_near_poses(candidates); ++round) {
+  }
+  candidates = contenders(std::move(candidates));
   parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
     if (!context_.cancelled()) register_densely(candidates[i]);
   });
@@ -545,7 +598,7 @@ Judge::Judge(const scan::Scan& scan, const model::PreparedModel& model, const Ve
              const Context& context, std::span<const std::uint8_t> taken, const detect::SampledScan* sampled) {
   ASBUILT_EXPECT(options.validate().has_value(), "valid options");
   ASBUILT_EXPECT(taken.empty() || taken.size() == scan.cloud.size(), "one byte a point of the scan");
-  verification_ = std::make_unique<const Verification>(scan, model, options, context, taken, sampled);
+  material_ = std::make_unique<const Material>(scan, model, options, context, taken, sampled);
 }
 Judge::~Judge() = default;
 Judge::Judge(Judge&&) noexcept = default;
@@ -560,7 +613,7 @@ Result<Detection> Judge::verdict_on(std::span<const detect::Hypothesis> hypothes
     candidate.votes = hypothesis.votes;
     candidates.push_back(candidate);
   }
-  return verification_->verdict_on(std::move(candidates), look, accept_anyway);
+  return Verification(*material_, look).verdict_on(std::move(candidates), look, accept_anyway);
 }
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,

@@ -33,7 +33,7 @@ struct VerifyOptions {
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
-  double near_equal_ratio = 0.01;  ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
+  double near_equal_ratio = 0.01;   ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
   double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
       1.5;  ///< contradictions and overrun, each as a share of its limit, together: right poses reach at most 1.2
@@ -84,8 +84,9 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
-/// How many candidates go through the pyramid: a quick look carries half as many as a thorough one, a patient look twice
-/// as many.
+/// How many candidates go through the pyramid: a quick look carries at most half as many as a thorough one, a patient
+/// look twice as many. Of the many hypotheses that it is for, one may pass by chance, so it allows only half the
+/// contradictions and the overrun.
 enum class Look { quick, thorough, patient };
 
 /// Judges hypotheses about one scan: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part
@@ -108,8 +109,9 @@ class Judge {
                                              bool accept_anyway = false) const;
 
  private:
+  struct Material;
   class Verification;
-  std::unique_ptr<const Verification> verification_;
+  std::unique_ptr<const Material> material_;
 };
 
 /// One question to a judge of its own.
