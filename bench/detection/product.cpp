@@ -26,6 +26,8 @@ void note(CaseRecord& record, const verify::Detection& detection) {
   record.normal_agreement = best.normal_agreement;
   record.contradiction_share = best.contradiction_share;
   record.hidden_share = best.hidden_share;
+  record.missing_share = best.missing_share;
+  record.facing_share = best.facing_share;
   record.residual_ratio = best.residual_ratio;
   record.weakest_direction = best.weakest_direction;
   record.slip_lead = best.slip_lead;

@@ -58,6 +58,8 @@ void for_each_field(Record& record, Visitor&& field) {
   field("normal_agreement", record.normal_agreement);
   field("contradiction_share", record.contradiction_share);
   field("hidden_share", record.hidden_share);
+  field("missing_share", record.missing_share);
+  field("facing_share", record.facing_share);
   field("residual_ratio", record.residual_ratio);
   field("weakest_direction", record.weakest_direction);
   field("slip_lead", record.slip_lead);
