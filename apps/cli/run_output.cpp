@@ -91,7 +91,9 @@ int exit_code_of(const io::RunRecord& record) {
   using enum io::ScanStatus;
   if (!record.scans.empty() && count_of(record, failed) == record.scans.size()) return kNoReadableInput;
   if (count_of(record, accepted) == 0) return kNotDone;
-  if (count_of(record, ambiguous) > 0 || count_of(record, disconnected) > 0) return kAmbiguousOrInPieces;
+  const bool undecided =
+      std::ranges::any_of(record.scans, [](const io::ScanRecord& scan) { return scan.reason_code == "symmetry"; });
+  if (undecided || count_of(record, ambiguous) > 0 || count_of(record, disconnected) > 0) return kAmbiguousOrInPieces;
   const bool judged = record.deviation && !record.deviation->verdict.empty();
   return judged && record.deviation->verdict != "pass" ? kOutOfTolerance : kDone;
 }

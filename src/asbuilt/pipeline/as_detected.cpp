@@ -10,7 +10,7 @@ io::ScanRecord as_detected(io::ScanRecord scan) {
   scan.hold_sigma.clear();
   scan.loose_motions.clear();
   scan.model_from_scan.reset();
-  if (scan.status == dropped || scan.status == disconnected) {
+  if (scan.status == dropped || scan.status == disconnected || scan.reason_code == "symmetry") {
     scan.status = accepted;
     scan.reason_code.clear();
     scan.reason.clear();

@@ -11,6 +11,7 @@
 #include "asbuilt/pipeline/posed_scans.h"
 #include "asbuilt/pipeline/recut_segments.h"
 #include "asbuilt/pipeline/report.h"
+#include "asbuilt/pipeline/scan_relations.h"
 #include "asbuilt/report/report.h"
 
 namespace asbuilt::pipeline {
@@ -72,29 +73,54 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
   if (!options.paper_mode) ASBUILT_CHECK(start_near_model(scans, model, context));
   ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
   registration.graph = std::move(first_graph);
+  bool placements_chosen = options.paper_mode;
+  const auto begin_again = [&]() -> Result<void> {
+    restore_seen_through(scans);
+    for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
+    ASBUILT_CHECK(start_near_model(scans, model, context));
+    ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
+    registration.graph = std::move(graph);
+    return {};
+  };
   for (int round = 1;; ++round) {
     ASBUILT_TRY(contradiction, refine_all(registration, model, options, folder, context));
+    if (!placements_chosen) {
+      placements_chosen = true;
+      const auto timed = folder.stage("compare");
+      ASBUILT_TRY(changed, choose_placements(registration.components.front(), scans, model, record, context));
+      if (changed) {
+        ASBUILT_CHECK(begin_again());
+        round = 0;
+        continue;
+      }
+    }
     // Rough starts leave a graph with gaps, in which a scan may have gone astray that a better one brings back.
     if (contradiction && round > 1) {
       drop(scans, *contradiction, record, context);
-      restore_seen_through(scans);
-      for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
-      ASBUILT_CHECK(start_near_model(scans, model, context));
-      ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
-      registration.graph = std::move(graph);
+      ASBUILT_CHECK(begin_again());
       round = 0;
       continue;
     }
-    if (options.paper_mode || round == kMostRounds) return {};
+    if (options.paper_mode) return {};
     if (round == 1 && !contradiction) {
       for (const RefinedComponent& component : registration.components) {
         ASBUILT_CHECK(remove_seen_through(component, scans, context));
       }
     }
-    for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local;
-    ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
-    if (round > 1 && same_links(graph, registration.graph)) return {};
-    registration.graph = std::move(graph);
+    if (round < kMostRounds) {
+      for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local;
+      ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
+      const bool same = same_links(graph, registration.graph);
+      if (round == 1 || !same) {
+        registration.graph = std::move(graph);
+        continue;
+      }
+    }
+    const auto timed = folder.stage("compare");
+    ASBUILT_TRY(separated, separate_individuals(registration.components.front(), scans, model, record, context));
+    if (!separated) return {};
+    ASBUILT_CHECK(begin_again());
+    round = 0;
   }
 }
 
@@ -187,9 +213,12 @@ void describe_scans(io::RunRecord& record, const Registration& registration, con
       describe_hold(scan, posed.hold, context);
       if (number == 0) continue;
       scan.status = io::ScanStatus::disconnected;
-      scan.reason_code = "disconnected";
-      scan.reason = "a good detection, but " +
-                    missing_link(member, registration.graph.components.front(), registration.graph, scans, record);
+      const std::vector<int>& largest = registration.graph.components.front();
+      const bool is_other = posed.individual != scans[static_cast<std::size_t>(largest.front())].individual;
+      scan.reason_code = is_other ? "other_individual" : "disconnected";
+      scan.reason =
+          "a good detection, but " +
+          (is_other ? posed.individual_reason : missing_link(member, largest, registration.graph, scans, record));
       context.warn(fmt::format("{}: disconnected: {}", scan.path, scan.reason));
     }
   }

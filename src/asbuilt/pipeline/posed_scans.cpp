@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "asbuilt/pipeline/segment_file.h"
@@ -13,15 +14,6 @@
 
 namespace asbuilt::pipeline {
 namespace {
-
-std::vector<refine::View> views_of(const std::vector<int>& members, const std::vector<PosedScan>& scans) {
-  std::vector<refine::View> views;
-  for (const int member : members) {
-    const PosedScan& scan = scans[static_cast<std::size_t>(member)];
-    views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
-  }
-  return views;
-}
 
 /// The graph's edges among the members, numbered by their place in `members`.
 std::vector<refine::Link> links_among(const std::vector<int>& members, const graph::PoseGraph& graph) {
@@ -69,6 +61,15 @@ scan::Viewpoint local_viewpoint(const io::ScanRecord& scan) {
 
 }  // namespace
 
+std::vector<refine::View> views_of(const std::vector<int>& members, const std::vector<PosedScan>& scans) {
+  std::vector<refine::View> views;
+  for (const int member : members) {
+    const PosedScan& scan = scans[static_cast<std::size_t>(member)];
+    views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
+  }
+  return views;
+}
+
 refine::Motion moved(const refine::Motion& motion, const Pose& b_from_a) {
   return {motion.is_turn, b_from_a.linear() * motion.direction, b_from_a * motion.through};
 }
@@ -101,8 +102,7 @@ Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, con
 Result<void> start_near_model(std::vector<PosedScan>& scans, const LoadedModel& model, const Context& context) {
   for (PosedScan& scan : scans) {
     const refine::View view{scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint};
-    ASBUILT_TRY(start,
-                refine::start_near_model(view, *model.prepared.surface, model.prepared.diameter, context));
+    ASBUILT_TRY(start, refine::start_near_model(view, *model.prepared.surface, model.prepared.diameter, context));
     scan.model_from_local_start = start;
   }
   return {};
@@ -112,7 +112,20 @@ Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedM
                               const Context& context) {
   std::vector<graph::PosedSegment> segments;
   for (const PosedScan& scan : scans) segments.push_back({scan.part, scan.model_from_local_start});
-  return graph::build_graph(segments, model.prepared, options.graph, context);
+  ASBUILT_TRY(graph, graph::build_graph(segments, model.prepared, options.graph, context));
+  const auto same = [&](const graph::PairOverlap& pair) {
+    return scans[static_cast<std::size_t>(pair.first)].individual ==
+           scans[static_cast<std::size_t>(pair.second)].individual;
+  };
+  if (std::ranges::all_of(graph.overlaps, same)) return graph;
+  // Chosen anew among the pairs that are left: one that seemed superfluous may now be what holds an individual
+  // together.
+  std::vector<graph::PairOverlap> pairs;
+  std::ranges::copy_if(graph.overlaps, std::back_inserter(pairs), same);
+  ASBUILT_TRY(selection, graph::select_edges(static_cast<int>(scans.size()), pairs, options.graph.edges));
+  graph.edges = std::move(selection.edges);
+  graph.components = std::move(selection.components);
+  return graph;
 }
 
 Result<RefinedComponent> refine_component(const std::vector<int>& members, const graph::PoseGraph& graph,

@@ -33,7 +33,9 @@ struct PosedScan {
   Matrix6d covariance = Matrix6d::Zero();
   refine::ViewHold hold;  ///< in the model frame
   double noise_sigma_mm = 0.0, spacing_mm = 0.0;
-  scan::Viewpoint viewpoint;  ///< for the coordinates of `part`
+  scan::Viewpoint viewpoint;      ///< for the coordinates of `part`
+  int individual = 0;             ///< scans of different ones are not linked, whatever they overlap
+  std::string individual_reason;  ///< what tells its individual from another; empty while there is one only
 };
 
 /// One component of the graph after its refinement.
@@ -53,6 +55,9 @@ struct Contradiction {
 /// The same motion in another frame.
 [[nodiscard]] refine::Motion moved(const refine::Motion& motion, const Pose& b_from_a);
 
+/// What the refinement works with: the members' parts at their starting poses.
+[[nodiscard]] std::vector<refine::View> views_of(const std::vector<int>& members, const std::vector<PosedScan>& scans);
+
 /// An accepted scan with its part, read from its segment file. `index` is its place in the record.
 /// Errors: unreadable_input.
 [[nodiscard]] Result<PosedScan> posed_scan(const io::ScanRecord& scan, int index, const std::filesystem::path& segment);
@@ -64,6 +69,7 @@ struct Contradiction {
 [[nodiscard]] Result<void> start_near_model(std::vector<PosedScan>& scans, const LoadedModel& model,
                                             const Context& context);
 
+/// The graph under the starting poses, without links between different individuals.
 [[nodiscard]] Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedModel& model,
                                             const Options& options, const Context& context);
 

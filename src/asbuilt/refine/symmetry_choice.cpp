@@ -190,8 +190,8 @@ Result<SymmetryChoice> choose_elements(const ComparedViews& views, std::span<con
     best.decided = std::move(decided);
   }
   // Only relations between views count: the reference keeps its element.
-  const Pose back = elements[static_cast<std::size_t>(cheapest[static_cast<std::size_t>(best.reference)])].inverse(
-      Eigen::Isometry);
+  const Pose back =
+      elements[static_cast<std::size_t>(cheapest[static_cast<std::size_t>(best.reference)])].inverse(Eigen::Isometry);
   for (std::size_t v = 0; v < count; ++v) {
     const Eigen::Matrix3d wanted = back.linear() * elements[static_cast<std::size_t>(cheapest[v])].linear();
     const auto off = [&](const Pose& element) { return (element.linear() - wanted).norm(); };

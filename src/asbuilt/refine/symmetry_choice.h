@@ -15,8 +15,8 @@ struct SymmetryChoice {
   std::vector<char> decided;  ///< one a view: 1 where what was built tells its element from every other
 };
 
-/// Detection knows a pose modulo the part's symmetry: the dent that makes one of six sectors different is not in the CAD.
-/// So the elements of all views are chosen jointly, such that the surfaces of all pairs differ least
+/// Detection knows a pose modulo the part's symmetry: the dent that makes one of six sectors different is not in the
+/// CAD. So the elements of all views are chosen jointly, such that the surfaces of all pairs differ least
 /// (ViewDifference::evidence, each pair fitted to one another first): best placements view by view, the clearest first,
 /// from each view as reference, then changed one at a time until nothing improves. An element is decided if every other
 /// one, the rest following, is worse by more than 15 and by more than what differs at the best. Views for which nothing

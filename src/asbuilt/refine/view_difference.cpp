@@ -59,7 +59,8 @@ ComparedViews::ComparedViews(std::span<const View> views, double diameter_mm, co
     : views_(views.size()), diameter_mm_(diameter_mm) {
   for (const View& view : views) points_.push_back(view.segment_in_scan.size());
   parallel_for(context, views.size(), 1, [&](std::size_t v) {
-    views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, {kPoints, kProbes, true, true}, context);
+    views_[v] =
+        sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, {kPoints, kProbes, true, true}, context);
   });
 }
 
@@ -157,7 +158,8 @@ Pose ComparedViews::aligned(int a, int b, const Pose& b_from_a) const {
     Vector6d twist = Vector6d::Zero();
     for (int i = 0; i < 6; ++i) {
       if (eigen.eigenvalues()[i] < kFirmlyHeld) continue;
-      twist -= eigen.eigenvectors().col(i).dot(gradient / weights) / eigen.eigenvalues()[i] * eigen.eigenvectors().col(i);
+      twist -=
+          eigen.eigenvectors().col(i).dot(gradient / weights) / eigen.eigenvalues()[i] * eigen.eigenvectors().col(i);
     }
     const Eigen::Matrix3d rotation = rotation_from_axis_angle(twist.head<3>() / radius);
     pose.linear() = rotation * pose.linear();

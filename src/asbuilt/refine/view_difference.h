@@ -15,10 +15,11 @@ namespace asbuilt::refine {
 
 /// How far two views of what should be one surface show different surfaces, patch by patch.
 struct ViewDifference {
-  std::size_t compared = 0;   ///< patches that both views measured, both ways
-  std::size_t differing = 0;  ///< of these: those whose mean distance neither noise nor a pose error of one sigma explains
-  double evidence = 0.0;      ///< of the differing ones, as a log-likelihood against "the same surface"
-  double height_mm = 0.0;     ///< sum of the mean distances of the differing patches
+  std::size_t compared = 0;  ///< patches that both views measured, both ways
+  std::size_t differing =
+      0;                   ///< of these: those whose mean distance neither noise nor a pose error of one sigma explains
+  double evidence = 0.0;   ///< of the differing ones, as a log-likelihood against "the same surface"
+  double height_mm = 0.0;  ///< sum of the mean distances of the differing patches
 
   ViewDifference& operator+=(const ViewDifference& other);
   [[nodiscard]] double share() const {
@@ -29,9 +30,9 @@ struct ViewDifference {
 struct SampledView;
 
 /// Views made ready to be compared under many relative poses. A single point says little: its noise is that of the
-/// sensor. The mean over a patch of one face (5 % of the diameter and four probes wide, eight points at least) is several times more
-/// exact, and shows a dent, a boss or a warp that a robust refinement passes over as outliers. Points at rims, and
-/// points whose counterpart lies more than 1.5 spacings to the side, do not count.
+/// sensor. The mean over a patch of one face (5 % of the diameter and four probes wide, eight points at least) is
+/// several times more exact, and shows a dent, a boss or a warp that a robust refinement passes over as outliers.
+/// Points at rims, and points whose counterpart lies more than 1.5 spacings to the side, do not count.
 class ComparedViews {
  public:
   ComparedViews(std::span<const View> views, double diameter_mm, const Context& context);
@@ -43,8 +44,8 @@ class ComparedViews {
   [[nodiscard]] std::size_t points(int view) const;  ///< of the view's segment
   [[nodiscard]] ViewDifference difference(int a, int b, const Pose& b_from_a) const;
 
-  /// The pair fitted to one another from close by (point to plane, Tukey, a few steps; what the pair does not hold firmly
-  /// stays): the relative pose under which difference() shows what differs in shape.
+  /// The pair fitted to one another from close by (point to plane, Tukey, a few steps; what the pair does not hold
+  /// firmly stays): the relative pose under which difference() shows what differs in shape.
   [[nodiscard]] Pose aligned(int a, int b, const Pose& b_from_a) const;
 
  private:
@@ -73,7 +74,8 @@ struct Individuals {
 /// that differ least, until two groups are left; believed if each has two views, and patches between the groups differ
 /// four times as often as within and in one case of twenty more. Views that share nothing decide nothing. nullopt: one
 /// individual, or fewer than four views. Errors: cancelled.
-[[nodiscard]] Result<std::optional<Individuals>> two_individuals(const ComparedViews& views, std::span<const Pose> poses,
+[[nodiscard]] Result<std::optional<Individuals>> two_individuals(const ComparedViews& views,
+                                                                 std::span<const Pose> poses,
                                                                  std::span<const Link> links, const Context& context);
 
 }  // namespace asbuilt::refine

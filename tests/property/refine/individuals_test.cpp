@@ -16,7 +16,8 @@ using Radius = std::function<double(const Eigen::Vector3d&)>;  // over the direc
 
 constexpr double kSigma = 0.05, kDiameter = 110.0;  // mm
 
-// Four lobes about z, another shape above than below: turns by 90 degrees about z map it onto itself, nothing else does.
+// Four lobes about z, another shape above than below: turns by 90 degrees about z map it onto itself, nothing else
+// does.
 double lobed(const Eigen::Vector3d& d) {
   const double across = d.x() * d.x() + d.y() * d.y();
   const double four = std::cos(4.0 * std::atan2(d.y(), d.x())) * across * across;
@@ -102,8 +103,7 @@ TEST(TwoIndividuals, AreToldApart) {
       const bool is_second = v == 1 || v == 4 || v == 6;
       Random random(seed, "pose", static_cast<std::uint64_t>(v));
       views.push_back(view_of(is_second ? second_casting : first_casting, from_above(v, 7),
-                              10 * seed + static_cast<std::uint64_t>(v),
-                              test::random_pose(random, 3.0, 200.0)));
+                              10 * seed + static_cast<std::uint64_t>(v), test::random_pose(random, 3.0, 200.0)));
       Vector6d off;
       off << test::random_direction(random) * 2e-4, test::random_direction(random) * 0.02;
       views.back().model_from_scan = pose_from_twist(off) * views.back().model_from_scan;

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/pipeline/scan_relations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "asbuilt/refine/symmetry_choice.h"
+#include "asbuilt/refine/view_difference.h"
+
+namespace asbuilt::pipeline {
+namespace {
+
+PosedScan& scan_of(int view, const RefinedComponent& component, std::vector<PosedScan>& scans) {
+  return scans[static_cast<std::size_t>(component.members[static_cast<std::size_t>(view)])];
+}
+
+std::vector<Pose> refined_poses(const RefinedComponent& component, const std::vector<PosedScan>& scans) {
+  std::vector<Pose> poses;
+  for (const int member : component.members) poses.push_back(scans[static_cast<std::size_t>(member)].model_from_local);
+  return poses;
+}
+
+std::string names_of(const std::vector<int>& views, const RefinedComponent& component,
+                     const std::vector<PosedScan>& scans, const io::RunRecord& record) {
+  std::string names;
+  for (const int view : views) {
+    const auto member = static_cast<std::size_t>(component.members[static_cast<std::size_t>(view)]);
+    names += (names.empty() ? "" : ", ") + record.scans[static_cast<std::size_t>(scans[member].index)].name;
+  }
+  return names;
+}
+
+void leave_out(const PosedScan& scan, std::size_t placements, io::RunRecord& record, const Context& context) {
+  io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
+  entry.status = io::ScanStatus::ambiguous;
+  entry.reason_code = "symmetry";
+  entry.reason = fmt::format(
+      "the part has {} placements that its CAD does not tell apart; other scans show what was built differently, this "
+      "one does not show where it belongs",
+      placements);
+  context.warn(fmt::format("{}: ambiguous: {}", entry.path, entry.reason));
+}
+
+void say_that_nothing_tells(const RefinedComponent& component, std::size_t placements, std::vector<PosedScan>& scans,
+                            io::RunRecord& record, const Context& context) {
+  for (std::size_t v = 0; v < component.members.size(); ++v) {
+    const PosedScan& scan = scan_of(static_cast<int>(v), component, scans);
+    io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
+    if (!entry.reason_code.empty()) continue;
+    entry.reason_code = "symmetry";
+    entry.reason = fmt::format(
+        "the part has {} placements that its CAD does not tell apart, and to within the noise the scans are alike in "
+        "all of them",
+        placements);
+  }
+  context.warn(fmt::format(
+      "the part has {} placements that its CAD does not tell apart, and no scan shows what was built differently: "
+      "which way round each scan belongs is not known",
+      placements));
+}
+
+}  // namespace
+
+Result<bool> choose_placements(const RefinedComponent& component, std::vector<PosedScan>& scans,
+                               const LoadedModel& model, io::RunRecord& record, const Context& context) {
+  const model::SymmetryGroup& symmetry = model.prepared.symmetry;
+  if (symmetry.kind != model::SymmetryGroup::Kind::discrete || component.members.size() < 2) return false;
+  const refine::ComparedViews views(views_of(component.members, scans), model.prepared.diameter, context);
+  ASBUILT_TRY(choice, refine::choose_elements(views, refined_poses(component, scans), component.links,
+                                              symmetry.elements, context));
+  if (std::ranges::count(choice.decided, 1) == 1) {
+    say_that_nothing_tells(component, symmetry.elements.size(), scans, record, context);
+    return false;
+  }
+  bool changed = false;
+  std::vector<int> undecided;
+  for (std::size_t v = 0; v < component.members.size(); ++v) {
+    PosedScan& scan = scan_of(static_cast<int>(v), component, scans);
+    const bool vouched_for = record.scans[static_cast<std::size_t>(scan.index)].reason_code == "accepted_by_user";
+    if (choice.decided[v] == 0) {
+      if (!vouched_for) undecided.push_back(component.members[v]);
+      continue;
+    }
+    if (choice.element[v] == 0 || vouched_for) continue;
+    const Pose& element = symmetry.elements[static_cast<std::size_t>(choice.element[v])];
+    scan.model_from_local_detected = orthonormalised(element * scan.model_from_local_detected);
+    changed = true;
+  }
+  std::ranges::sort(undecided, std::ranges::greater{});
+  for (const int member : undecided) {
+    leave_out(scans[static_cast<std::size_t>(member)], symmetry.elements.size(), record, context);
+    scans.erase(scans.begin() + member);
+  }
+  return changed || !undecided.empty();
+}
+
+Result<bool> separate_individuals(const RefinedComponent& component, std::vector<PosedScan>& scans,
+                                  const LoadedModel& model, const io::RunRecord& record, const Context& context) {
+  if (component.members.size() < 4) return false;
+  const refine::ComparedViews views(views_of(component.members, scans), model.prepared.diameter, context);
+  ASBUILT_TRY(found, refine::two_individuals(views, refined_poses(component, scans), component.links, context));
+  if (!found) return false;
+  const int next = 1 + std::ranges::max_element(scans, {}, &PosedScan::individual)->individual;
+  for (const std::vector<int>& group : {found->first, found->second}) {
+    const std::string reason = fmt::format(
+        "of another individual: where both were measured, its surface lies elsewhere in {:.0f} % of the places, "
+        "usually by {:.3g} mm (among scans of one individual in {:.1f} %); these belong together: {}",
+        100.0 * found->share_between, found->height_mm, 100.0 * found->share_within,
+        names_of(group, component, scans, record));
+    for (const int view : group) {
+      PosedScan& scan = scan_of(view, component, scans);
+      scan.individual_reason = reason;
+      if (group == found->second) scan.individual = next;
+    }
+  }
+  return true;
+}
+
+}  // namespace asbuilt::pipeline
