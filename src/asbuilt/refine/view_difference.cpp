@@ -60,7 +60,11 @@ ComparedViews::ComparedViews(std::span<const View> views, double diameter_mm, co
   for (const View& view : views) points_.push_back(view.segment_in_scan.size());
   parallel_for(context, views.size(), 1, [&](std::size_t v) {
     views_[v] =
-        sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, {kPoints, kProbes, true, true}, context);
+        sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, {kPoints, kProbes, true, false}, context);
+    // Rims and edges alone, not all that is near them: the mean over a patch bears a few mixed points, and on a
+    // coarsely scanned part nearly everything is near.
+    const std::vector<Place> places = places_of(views_[v].points, *views_[v].tree, views_[v].spacing_mm, context);
+    for (std::size_t i = 0; i < places.size(); ++i) views_[v].weight[i] = places[i] == Place::inside ? 1.0F : 0.0F;
   });
 }
 

@@ -32,7 +32,7 @@ struct SampledView;
 /// Views made ready to be compared under many relative poses. A single point says little: its noise is that of the
 /// sensor. The mean over a patch of one face (5 % of the diameter and four probes wide, eight points at least) is
 /// several times more exact, and shows a dent, a boss or a warp that a robust refinement passes over as outliers.
-/// Points at rims, and points whose counterpart lies more than 1.5 spacings to the side, do not count.
+/// Points at rims and edges, and points whose counterpart lies more than 1.5 spacings to the side, do not count.
 class ComparedViews {
  public:
   ComparedViews(std::span<const View> views, double diameter_mm, const Context& context);
