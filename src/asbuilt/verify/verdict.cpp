@@ -154,6 +154,26 @@ bool refutes(Reason objection) {
   }
 }
 
+// Whether it clears every limit by so much that a search of the whole scan could not unsettle it.
+bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
+  constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
+  constexpr double kMostMissing = 0.15;  // what returned nothing shows no edges, nor that there are none
+  const bool edges_hold_firmly =
+      c.slip_lead >= kTwice * edge_measurements_needed(c, options) && c.missing_share <= kMostMissing;
+  const bool is_held_firmly = c.weakest_direction >= kTwice * options.min_weakest_direction || edges_hold_firmly;
+  return objection(c, options).reason == Reason::none && is_held_firmly &&
+         proof(c) >= proof_needed(c, options) + kProofToSpare &&
+         c.contradiction_share <= kHalf * options.max_contradiction_share &&
+         c.overrun_share <= kHalf * options.max_overrun_share;
+}
+
+// One flat face between edges fits other things too, now and then: that is no second part, and no better one, beside a
+// pose that the surface holds beyond doubt.
+bool is_outshone(const Candidate& c, const Candidate& other, const VerifyOptions& options) {
+  return c.weakest_direction < options.min_weakest_direction && !is_beyond_doubt(c, options) &&
+         other.weakest_direction >= options.min_weakest_direction && is_beyond_doubt(other, options);
+}
+
 enum class Outcome { first, second, undecided };
 
 Outcome winner(const PoseContrast& contrast, const VerifyOptions& options) {
@@ -204,6 +224,14 @@ void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedM
   }
 }
 
+// A pose beyond doubt goes before one that is not and that only edges hold, whatever their supports.
+void put_clear_first(std::vector<Candidate>& candidates, const VerifyOptions& options) {
+  const auto clear = std::ranges::find_if(candidates, [&](const Candidate& other) {
+    return is_comparable(other, candidates.front()) && is_outshone(candidates.front(), other, options);
+  });
+  if (clear != candidates.end()) std::rotate(candidates.begin(), clear, clear + 1);
+}
+
 // Largest distance of the part's surface at one pose from that at another; infinite beyond the field.
 double surface_apart_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
   const Eigen::Isometry3f a_from_b = (a_from_scan * b_from_scan.inverse()).cast<float>();
@@ -229,7 +257,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     const Candidate& rival = candidates[i];
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
     if (!is_in_one_place(best, rival, model)) {
-      if (one_of_several) continue;
+      if (one_of_several || is_outshone(rival, best, options)) continue;
       return {Reason::second_instance, second_instance_sentence(best, rival, model)};
     }
     std::optional<PoseContrast> contrast;
@@ -328,11 +356,14 @@ std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::si
   std::ranges::stable_sort(candidates, std::ranges::greater{}, &Candidate::support);
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {
-    if (kept.size() == most) break;
-    const bool is_new = std::ranges::none_of(kept, [&](const Candidate& other) {
+    const auto same = std::ranges::find_if(kept, [&](const Candidate& other) {
       return apart(other.model_from_scan, candidate.model_from_scan, model) <= least_apart_mm;
     });
-    if (is_new) kept.push_back(candidate);
+    if (same != kept.end()) {
+      same->votes = std::max(same->votes, candidate.votes);
+    } else if (kept.size() < most) {
+      kept.push_back(candidate);
+    }
   }
   return kept;
 }
@@ -343,14 +374,7 @@ bool is_comparable(const Candidate& rival, const Candidate& best) {
 }
 
 bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options) {
-  constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
-  if (detection.status != Status::accepted || options.paper_mode) return false;
-  const Candidate& best = detection.best;
-  const bool is_held_firmly = best.weakest_direction >= kTwice * options.min_weakest_direction ||
-                              best.slip_lead >= kTwice * edge_measurements_needed(best, options);
-  return is_held_firmly && proof(best) >= proof_needed(best, options) + kProofToSpare &&
-         best.contradiction_share <= kHalf * options.max_contradiction_share &&
-         best.overrun_share <= kHalf * options.max_overrun_share;
+  return detection.status == Status::accepted && !options.paper_mode && is_beyond_doubt(detection.best, options);
 }
 
 bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
@@ -382,6 +406,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   if (!options.paper_mode) {
     std::ranges::stable_partition(detection.candidates, [](const Candidate& c) { return !refutes(c.objection); });
   }
+  if (!options.paper_mode) put_clear_first(detection.candidates, options);
   const bool is_good = detection.candidates.front().objection == Reason::none;
   if (is_good && compare && !options.paper_mode) put_winner_first(detection.candidates, model, options, compare);
   detection.best = detection.candidates.front();

@@ -22,7 +22,8 @@ namespace asbuilt::verify {
                                             const model::PreparedModel& model);
 
 /// The candidates by decreasing support, at most `most`, each moving the part by more than `least_apart_mm` from every
-/// better one: candidates that ran into the same pose count once. Modulo the symmetry unless in paper mode.
+/// better one: candidates that ran into the same pose count once, with the most votes that any of them had. Modulo the
+/// symmetry unless in paper mode.
 [[nodiscard]] std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::size_t most,
                                                     double least_apart_mm, const model::PreparedModel& model,
                                                     const VerifyOptions& options);

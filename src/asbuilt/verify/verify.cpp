@@ -272,12 +272,14 @@ class Judge::Verification {
   }
 
   // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
-  // place. The first is not refuted, if any is not: put_refuted_last.
+  // place. The first, which stays whatever its support, is not refuted, if any is not: put_refuted_last.
   [[nodiscard]] std::vector<Candidate> contenders(std::vector<Candidate> candidates) const {
     constexpr double kShare = 0.2;
     if (options_.paper_mode || candidates.empty()) return candidates;
     const double least = kShare * candidates.front().support;
-    std::erase_if(candidates, [&](const Candidate& c) { return c.support < least; });
+    candidates.erase(std::remove_if(candidates.begin() + 1, candidates.end(),
+                                    [&](const Candidate& c) { return c.support < least; }),
+                     candidates.end());
     return candidates;
   }
 

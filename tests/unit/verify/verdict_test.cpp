@@ -198,6 +198,24 @@ TEST(Verdict, OnASecondInstanceIsAmbiguous) {
   EXPECT_EQ(detection.candidates.size(), 2U);
 }
 
+TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
+  const auto status_beside = [](const Candidate& best, double missing_share, double support) {
+    Candidate face = flawless({300, 0, 600});
+    face.weakest_direction = 0.0, face.slip_lead = 60.0, face.loose_directions = 2;
+    face.missing_share = missing_share, face.support = support;
+    return decide({best, face}, block(), {});
+  };
+  for (const double support : {0.3, 0.5}) {
+    const Detection detection = status_beside(flawless(), 0.3, support);
+    EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+    EXPECT_GT(detection.best.weakest_direction, 0.0);
+  }
+  EXPECT_EQ(status_beside(flawless(), 0.0, 0.3).reason, Reason::second_instance) << "edges hold it beyond doubt";
+  Candidate doubtful = flawless();
+  doubtful.contradiction_share = 0.02;
+  EXPECT_EQ(status_beside(doubtful, 0.3, 0.3).reason, Reason::second_instance);
+}
+
 TEST(Verdict, KnowsASecondPlacementFromClutterAndFromAnotherPoseInThePlace) {
   const Candidate best = flawless();
   EXPECT_TRUE(is_second_instance(best, flawless({300, 0, 600}), block(), {}));
@@ -240,11 +258,12 @@ TEST(Verdict, IsNotShakenByARivalThatWouldBeRejected) {
 
 TEST(Verdict, CountsNearlyEqualPosesAsOne) {
   Candidate again = flawless({0.5, 0, 600});
-  again.support = 0.39;
+  again.support = 0.39, again.votes = 100.0;
   const Detection detection = decide({again, flawless()}, block(), {});
   EXPECT_EQ(detection.status, Status::accepted);
   EXPECT_EQ(detection.candidates.size(), 1U);
   EXPECT_EQ(detection.best.support, 0.4) << "the best, in whatever order they come";
+  EXPECT_EQ(detection.best.votes, 100.0) << "the votes of all of them are for this pose";
   EXPECT_EQ(detection.margin, 0.4);
 }
 
