@@ -41,7 +41,9 @@ double edge_measurements_needed(const Candidate& c, const VerifyOptions& options
   constexpr double kShare = 0.006;  // of the measurements explained
   constexpr double kFurtherDirection = 0.75, kWithoutRays = 6.0;
   const double directions = 1.0 + kFurtherDirection * std::max(0, c.loose_directions - 1);
-  const double needed = directions * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
+  // What returned nothing shows neither edges nor that there are none.
+  const double unseen = 1.0 + 2.0 * options.missing_hold_surcharge * c.missing_share;
+  const double needed = directions * unseen * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
   return c.without_rays ? kWithoutRays * needed : needed;
 }
 
@@ -63,8 +65,8 @@ bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
 bool is_held(const Candidate& c, const VerifyOptions& options) {
   constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
   const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
-  return c.weakest_direction >= options.min_weakest_direction || is_held_by_edges(c, options) ||
-         (c.weakest_but_near >= options.min_weakest_direction && holds_turn);
+  const double needed = hold_needed(c, options);
+  return c.weakest_direction >= needed || is_held_by_edges(c, options) || (c.weakest_but_near >= needed && holds_turn);
 }
 
 struct Finding {
@@ -125,7 +127,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
     return {Reason::under_constrained,
             fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
                         "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
-                        c.weakest_direction, options.min_weakest_direction, std::max(0.0, c.slip_lead),
+                        c.weakest_direction, hold_needed(c, options), std::max(0.0, c.slip_lead),
                         edge_measurements_needed(c, options))};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
@@ -157,10 +159,8 @@ bool refutes(Reason objection) {
 // Whether it clears every limit by so much that a search of the whole scan could not unsettle it.
 bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
   constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
-  constexpr double kMostMissing = 0.15;  // what returned nothing shows no edges, nor that there are none
-  const bool edges_hold_firmly =
-      c.slip_lead >= kTwice * edge_measurements_needed(c, options) && c.missing_share <= kMostMissing;
-  const bool is_held_firmly = c.weakest_direction >= kTwice * options.min_weakest_direction || edges_hold_firmly;
+  const bool is_held_firmly = c.weakest_direction >= kTwice * hold_needed(c, options) ||
+                              c.slip_lead >= kTwice * edge_measurements_needed(c, options);
   return objection(c, options).reason == Reason::none && is_held_firmly &&
          proof(c) >= proof_needed(c, options) + kProofToSpare &&
          c.contradiction_share <= kHalf * options.max_contradiction_share &&
@@ -170,8 +170,8 @@ bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
 // One flat face between edges fits other things too, now and then: that is no second part, and no better one, beside a
 // pose that the surface holds beyond doubt.
 bool is_outshone(const Candidate& c, const Candidate& other, const VerifyOptions& options) {
-  return c.weakest_direction < options.min_weakest_direction && !is_beyond_doubt(c, options) &&
-         other.weakest_direction >= options.min_weakest_direction && is_beyond_doubt(other, options);
+  return c.weakest_direction < hold_needed(c, options) && !is_beyond_doubt(c, options) &&
+         other.weakest_direction >= hold_needed(other, options) && is_beyond_doubt(other, options);
 }
 
 enum class Outcome { first, second, undecided };
@@ -266,7 +266,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     // Along what hardly more than edges hold, a little more surface is found at a wrong pose as easily as at the right
     // one.
     constexpr double kTwice = 2.0;
-    const bool is_firm = best.weakest_direction >= kTwice * options.min_weakest_direction;
+    const bool is_firm = best.weakest_direction >= kTwice * hold_needed(best, options);
     const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
@@ -281,7 +281,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
 
 // Whether it is loose in nothing but turns about the part's axes of near-symmetry.
 bool is_loose_in_turn_only(Candidate c, const VerifyOptions& options) {
-  if (options.paper_mode || c.weakest_but_near < options.min_weakest_direction) return false;
+  if (options.paper_mode || c.weakest_but_near < hold_needed(c, options)) return false;
   c.weakest_direction = c.weakest_but_near;
   return objection(c, options).reason == Reason::none;
 }
@@ -340,6 +340,10 @@ const char* code_of(Reason reason) {
       return "wrong_unit";
   }
   return "";
+}
+
+double hold_needed(const Candidate& candidate, const VerifyOptions& options) {
+  return options.min_weakest_direction * (1.0 + options.missing_hold_surcharge * candidate.missing_share);
 }
 
 double displacement_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {

@@ -28,6 +28,10 @@ namespace asbuilt::verify {
                                                     double least_apart_mm, const model::PreparedModel& model,
                                                     const VerifyOptions& options);
 
+/// The `weakest_direction` that a candidate needs to be held by the surface that was found: the more, the more of the
+/// surface that should be visible returned nothing, for there nothing can deny the pose.
+[[nodiscard]] double hold_needed(const Candidate& candidate, const VerifyOptions& options);
+
 /// Whether a rival is nearly as well proven as the best candidate and explains a fair part of what that one does.
 /// Clutter that passes the thresholds alone is not a second part beside a clear first.
 [[nodiscard]] bool is_comparable(const Candidate& rival, const Candidate& best);

@@ -328,14 +328,14 @@ class Judge::Verification {
       evidence = judged_densely();
     }
     const auto is_loose = [&] {
-      return !options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction;
+      return !options_.paper_mode && candidate.weakest_direction < hold_needed(candidate, options_);
     };
     // What edges show is read as finely as this part fits, not as deviating parts may.
     const double edge_distance =
         std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance_, final_distance_);
     const EvidenceOptions edge_options{edge_distance, lateral(edge_distance)};
     const auto settled = [&](const Pose& pose) {
-      return settled_between_edges(pose, evidence, model_, options_.min_weakest_direction, evidence_, edge_options);
+      return settled_between_edges(pose, evidence, model_, hold_needed(candidate, options_), evidence_, edge_options);
     };
     if (is_loose() && may_have_drifted(candidate)) {
       const Pose drifted = candidate.model_from_scan;
@@ -346,8 +346,8 @@ class Judge::Verification {
     if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     constexpr int kMostMoves = 2;
     for (int move = 0; is_loose() && is_plausible(); ++move) {
-      candidate.loose_directions = loose_directions(evidence, model_, options_.min_weakest_direction);
-      const Slip rival = strongest_rival(candidate.model_from_scan, evidence, around, edge_options);
+      candidate.loose_directions = loose_directions(evidence, model_, hold_needed(candidate, options_));
+      const Slip rival = strongest_rival(candidate, evidence, around, edge_options);
       candidate.slip_lead = std::isfinite(rival.lead_over_it) ? rival.lead_over_it : 0.0;
       if (candidate.slip_lead >= 0.0 || move == kMostMoves) break;
       candidate.model_from_scan = settled(rival.model_from_scan);
@@ -374,7 +374,7 @@ class Judge::Verification {
     constexpr double kLeaderShare = 0.7;  // of the best support
     std::vector<Candidate> near;
     if (options_.paper_mode || candidates.empty()) return near;
-    const bool is_loose = candidates.front().weakest_direction < options_.min_weakest_direction;
+    const bool is_loose = candidates.front().weakest_direction < hold_needed(candidates.front(), options_);
     const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : is_loose ? 1 : 0;
     for (std::size_t i = 0; i < std::min(leaders, candidates.size()); ++i) {
       if (candidates[i].support < kLeaderShare * candidates.front().support) break;
@@ -394,7 +394,7 @@ class Judge::Verification {
   }
 
   // Of the poses into which the part may have slipped that which comes closest, or one that explains the scan better.
-  [[nodiscard]] Slip strongest_rival(const Pose& model_from_scan, const PoseEvidence& evidence,
+  [[nodiscard]] Slip strongest_rival(const Candidate& candidate, const PoseEvidence& evidence,
                                      std::span<const Eigen::Vector3f> points_in_scan,
                                      const EvidenceOptions& edge_options) const {
     Slip strongest;
@@ -402,25 +402,26 @@ class Judge::Verification {
       if (slip.lead_over_it < strongest.lead_over_it) strongest = slip;
     };
     for (const double slip : kSlips) {
-      consider(strongest_slip(model_from_scan, evidence, model_, options_.min_weakest_direction, slip * model_.diameter,
-                              evidence_, edge_options));
+      consider(strongest_slip(candidate.model_from_scan, evidence, model_, hold_needed(candidate, options_),
+                              slip * model_.diameter, evidence_, edge_options));
     }
     if (strongest.lead_over_it > 0.0 && std::isfinite(strongest.lead_over_it)) {
-      consider(strongest_far_slip(model_from_scan, evidence, points_in_scan, edge_options));
+      consider(strongest_far_slip(candidate, evidence, points_in_scan, edge_options));
     }
     return strongest;
   }
 
   // The same over poses further along the loose directions, each brought onto the surface again.
-  [[nodiscard]] Slip strongest_far_slip(const Pose& model_from_scan, const PoseEvidence& evidence,
+  [[nodiscard]] Slip strongest_far_slip(const Candidate& candidate, const PoseEvidence& evidence,
                                         std::span<const Eigen::Vector3f> points_in_scan,
                                         const EvidenceOptions& edge_options) const {
     constexpr std::size_t kMostPoints = 2000;
     constexpr int kMostIterations = 20;
     const auto points = points_in_scan.first(std::min(kMostPoints, points_in_scan.size()));
+    const Pose& model_from_scan = candidate.model_from_scan;
     Slip strongest;
     for (const double slip : kFarSlips) {
-      for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model_, options_.min_weakest_direction,
+      for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model_, hold_needed(candidate, options_),
                                                slip * model_.diameter, Slips::single)) {
         const Pose there =
             lm_icp(points, slipped, model_, scan_.viewpoint, {1.5 * final_distance_, kMostIterations, only_facing()})
@@ -566,6 +567,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("no_rays_surcharge", no_rays_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("missing_hold_surcharge", missing_hold_surcharge, 0.0, 100.0));
   ASBUILT_CHECK(expect_between("near_equal_ratio", near_equal_ratio, 0.0, 0.1));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_joint_denial", max_joint_denial, 0.0, 2.0));

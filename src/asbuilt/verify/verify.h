@@ -33,6 +33,8 @@ struct VerifyOptions {
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
+  double missing_hold_surcharge =
+      3.0;  ///< times as much more of it is asked for per share that returned nothing; of edges twice that
   double near_equal_ratio = 0.01;   ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
   double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
@@ -76,6 +78,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("missing_surcharge", options.missing_surcharge, "likewise per share that returned nothing");
   field("no_rays_surcharge", options.no_rays_surcharge, "likewise where the viewpoint is unknown");
   field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
+  field("missing_hold_surcharge", options.missing_hold_surcharge,
+        "how many times more hold is asked for per share that returned nothing; twice that of edges");
   field("near_equal_ratio", options.near_equal_ratio,
         "distance / diameter within which the surfaces of two poses need not be told apart");
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");

@@ -92,6 +92,20 @@ TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradi
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
 }
 
+// 0.004 of at least 0.0035 * (1 + 3 * missing); 25 of at least 10.8 * (1 + 6 * missing) measurements.
+TEST(Verdict, AsksForMoreHoldWhereMoreReturnedNothing) {
+  const auto reason_of = [](double weakest_direction, double slip_lead, double missing_share) {
+    Candidate candidate = flawless();
+    candidate.weakest_direction = weakest_direction, candidate.slip_lead = slip_lead;
+    candidate.loose_directions = 1, candidate.missing_share = missing_share;
+    return decide({candidate}, block(), {}).reason;
+  };
+  EXPECT_EQ(reason_of(0.004, 0.0, 0.03), Reason::none);
+  EXPECT_EQ(reason_of(0.004, 0.0, 0.08), Reason::under_constrained);
+  EXPECT_EQ(reason_of(0.0, 25.0, 0.2), Reason::none);
+  EXPECT_EQ(reason_of(0.0, 25.0, 0.3), Reason::under_constrained);
+}
+
 TEST(Verdict, TheOutlineOfOneFaceProvesAPlateButNotABlock) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
