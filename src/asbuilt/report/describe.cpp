@@ -114,7 +114,7 @@ std::string alignment_detail(const ReportInput& input) {
 
 std::string verdict_reason(const ReportInput& input) {
   const inspect::DeviationReport& deviations = input.deviations;
-  if (!deviations.verdict) return "no tolerance was given";
+  if (!deviations.verdict) return "limits stated with --tolerance would give a verdict";
   switch (*deviations.verdict) {
     case inspect::Verdict::fail: {
       const inspect::SurfacePart* part = worst_failure(deviations);

@@ -83,7 +83,7 @@ export function scans_table(report) {
     { title: '#', of: (scan) => number(scan.index), numeric: true }, { title: 'scan', of: (scan) => scan.name, class: 'name' },
     { title: 'status', of: (scan) => status_badge(scan.status) },
     { title: 'points', of: (scan) => number(scan.points), numeric: true }, { title: 'on the part', of: (scan) => number(scan.segment_points), numeric: true },
-    { title: 'share of part', of: (scan) => percent(scan.share_of_part), numeric: true }, { title: 'score', of: (scan) => number(scan.score, 2), numeric: true },
+    { title: 'main source of', of: (scan) => percent(scan.share_of_part), numeric: true }, { title: 'score', of: (scan) => number(scan.score, 2), numeric: true },
     { title: 'links', of: (scan) => number(scan.links), numeric: true }, { title: 'best overlap', of: (scan) => percent(scan.best_overlap, 0), numeric: true },
     { title: 'residual, mm', of: (scan) => number(scan.residual, d), numeric: true }, { title: 'position 1σ', of: (scan) => number(scan.position_sigma, d), numeric: true },
     { title: 'rotation 1σ', of: (scan) => (typeof scan.rotation_sigma_deg === 'number' ? `${number(scan.rotation_sigma_deg, 3)}°` : kNone), numeric: true },
