@@ -77,7 +77,7 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.cloud.positions = std::move(clean.cloud.positions);
   const std::vector<Eigen::Vector3f> file_normals = std::move(clean.cloud.normals);
 
-  const KdTree tree(scan.cloud.positions);
+  const KdTree tree(scan.cloud.positions, context);
   scan.spacing_mm = median_spacing(scan.cloud.positions, tree);
   scan.noise_sigma_mm =
       options.noise_sigma_mm > 0.0 ? options.noise_sigma_mm : estimate_noise(scan.cloud.positions, tree, context);
@@ -103,7 +103,7 @@ PointCloud downsample(const Scan& scan, double spacing_mm, double normal_radius_
   } else {
     source = positions;
   }
-  const KdTree tree(source);
+  const KdTree tree(source, context);
 
   PointCloud samples;
   samples.positions.resize(chosen.size());

@@ -164,11 +164,12 @@ bool is_thin(const Eigen::Vector3f& in_model, const model::DistanceField::Sample
 
 }  // namespace
 
-ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background)
+ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background,
+                           const Context& context)
     : scan(the_scan),
       background(the_background),
       foreground(without(the_scan, the_background)),
-      foreground_tree(foreground.cloud.positions) {
+      foreground_tree(foreground.cloud.positions, context) {
   if (!scan.viewpoint.known()) return;
   depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
   field.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);

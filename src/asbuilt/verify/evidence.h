@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/pose.h"
@@ -21,7 +22,8 @@ namespace asbuilt::verify {
 struct ScanEvidence {
   /// `background` marks points that cannot be the part's (planes larger than it); they hide and reveal, but never
   /// confirm.
-  ScanEvidence(const scan::Scan& scan, const std::vector<std::uint8_t>& background);
+  ScanEvidence(const scan::Scan& scan, const std::vector<std::uint8_t>& background,
+               const Context& context = Context(1));
 
   const scan::Scan& scan;
   std::vector<std::uint8_t> background;  ///< one a point of the scan

@@ -196,7 +196,7 @@ struct Judge::Material {
         options(the_options),
         context(the_context),
         background(background_of(scan, model, options, context, sampled)),
-        evidence(scan, with(taken, background)),
+        evidence(scan, with(taken, background), context),
         measurements_per_sample(verify::measurements_per_sample(model, scan)),
         final_distance(score_distance(scan, model, options)),
         shuffled_foreground(shuffled(evidence.foreground.cloud.positions)),
