@@ -24,7 +24,8 @@ struct PeerPoints {
   [[nodiscard]] PointsRead summed(double mm_per_unit) const {
     PointsRead read{rows.size() + x.size()};
     for (const Eigen::Vector3d& row : rows) read.sum_mm += mm_per_unit * row;
-    for (std::size_t i = 0; i < x.size(); ++i) read.sum_mm += mm_per_unit * Eigen::Vector3f(x[i], y[i], z[i]).cast<double>();
+    for (std::size_t i = 0; i < x.size(); ++i)
+      read.sum_mm += mm_per_unit * Eigen::Vector3f(x[i], y[i], z[i]).cast<double>();
     return read;
   }
 };

@@ -63,9 +63,9 @@ Result<void> write_plys(const fs::path& folder, const std::vector<Eigen::Vector3
   const std::vector<double> wide_x(x.begin(), x.end()), wide_y(y.begin(), y.end()), wide_z(z.begin(), z.end());
   const std::vector<io::PlyColumn> bare{column("x", x), column("y", y), column("z", z)};
   const std::vector<io::PlyColumn> wide{column("x", wide_x), column("y", wide_y), column("z", wide_z)};
-  const std::vector<io::PlyColumn> full{column("x", x),       column("y", y),       column("z", z),
-                                    column("nx", nx),     column("ny", nx),     column("nz", nz),
-                                    column("red", grey),  column("green", grey), column("blue", grey)};
+  const std::vector<io::PlyColumn> full{column("x", x),      column("y", y),        column("z", z),
+                                        column("nx", nx),    column("ny", nx),      column("nz", nz),
+                                        column("red", grey), column("green", grey), column("blue", grey)};
   ASBUILT_CHECK(io::write_ply(folder / "float.ply", bare));
   ASBUILT_CHECK(io::write_ply(folder / "double.ply", wide));
   return io::write_ply(folder / "normals_colours.ply", full);
@@ -162,8 +162,11 @@ int run(int argc, char** argv) {
     if (const auto written = write_plys(folder, points); !written) throw std::runtime_error(written.error().message);
     if (const auto written = write_e57s(folder, points); !written) fmt::print(stderr, "{}\n", written.error().message);
   }
-  fmt::print("| file | reader | s | processor s | million points a second | and a processor second |\n|---|---|---|---|---|---|\n");
-  for (const char* name : {"float.ply", "double.ply", "normals_colours.ply", "float.e57", "colours.e57", "integers.e57"}) {
+  fmt::print(
+      "| file | reader | s | processor s | million points a second | and a processor second "
+      "|\n|---|---|---|---|---|---|\n");
+  for (const char* name :
+       {"float.ply", "double.ply", "normals_colours.ply", "float.e57", "colours.e57", "integers.e57"}) {
     if (fs::exists(folder / name)) compare(folder / name);
   }
   return 0;
@@ -172,4 +175,6 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace asbuilt::bench
 
-int main(int argc, char** argv) { return asbuilt::bench::run_program("asbuilt_reading", asbuilt::bench::run, argc, argv); }
+int main(int argc, char** argv) {
+  return asbuilt::bench::run_program("asbuilt_reading", asbuilt::bench::run, argc, argv);
+}
