@@ -38,6 +38,7 @@ struct ScanInfo {
 
 struct FileInfo {
   std::string path, kind, format, unit = "mm";
+  bool unit_is_known = true;  ///< stated by the file or by the user; else mm was taken
   std::size_t points = 0, triangles = 0;
   Eigen::AlignedBox3d box;
   std::vector<ScanInfo> scans;
@@ -61,11 +62,13 @@ void add_scan(FileInfo& info, const io::ScanFile& file, const Context& context) 
                         file.cloud.has_normals(), file.grid, !file.colours.empty(), !file.intensities.empty()});
   info.unit = io::name_of(file.unit);
   info.notes.insert(info.notes.end(), file.notes.begin(), file.notes.end());
-  const std::size_t removed = file.cloud.size() - sane.cloud.size();
+  // STL repeats a corner in each of its triangles: there that is no flaw.
+  const std::size_t duplicates = file.format.starts_with("stl") ? 0 : sane.report.duplicates;
+  const std::size_t removed = sane.report.not_finite + sane.report.no_return + duplicates;
   if (removed > 0) {
     info.notes.push_back(fmt::format("{}: {} unusable point{} ({} not finite, {} without return, {} duplicates)",
                                      file.name, removed, removed == 1 ? "" : "s", sane.report.not_finite,
-                                     sane.report.no_return, sane.report.duplicates));
+                                     sane.report.no_return, duplicates));
   }
 }
 
@@ -116,6 +119,21 @@ void describe_model(FileInfo& info, const io::ModelFile& model) {
                                    model.cad_parts == 1 ? "one body" : fmt::format("{} bodies", model.cad_parts)));
 }
 
+/// A hint where the size that follows from taking mm is that of nothing that is scanned.
+void look_at_unit(FileInfo& info, const Arguments& arguments) {
+  constexpr double kSmallest_mm = 10.0;
+  const bool states_it = info.kind == "cad" || info.format.starts_with("e57");
+  info.unit_is_known = states_it || arguments.reading.unit != io::Unit::stated;
+  const bool says_so_already = info.format.starts_with("las") || info.format.starts_with("ptx");
+  if (info.unit_is_known || says_so_already || info.box.isEmpty()) return;
+  const double diagonal_mm = info.box.sizes().norm();
+  if (diagonal_mm >= kSmallest_mm || diagonal_mm == 0.0) return;
+  info.notes.push_back(
+      fmt::format("The file states no unit. In mm all of it is {:.3g} mm across; were it in metres, {:.3g} m: "
+                  "then say --unit m of a model and --scan-unit m of a scan.",
+                  diagonal_mm, diagonal_mm));
+}
+
 Result<void> describe(FileInfo& info, const Arguments& arguments, const Context& context) {
   const std::filesystem::path path(info.path);
   if (std::filesystem::is_directory(path)) return describe_result(info, path / "result.json");
@@ -132,6 +150,7 @@ Result<void> describe(FileInfo& info, const Arguments& arguments, const Context&
   for (const io::ScanFile& file : *scans) add_scan(info, file, context);
   if (!model) info.kind = "scan";
   info.format = scans->front().format;
+  look_at_unit(info, arguments);
   return {};
 }
 
@@ -170,9 +189,12 @@ std::string printable(std::string text) {
 std::string lines_of(const FileInfo& info) {
   if (!info.error.empty()) return {};  // told on standard error
   const Eigen::Vector3d extent = info.box.isEmpty() ? Eigen::Vector3d::Zero().eval() : info.box.sizes().eval();
-  std::string text =
-      fmt::format("{}\n  {}, {}, unit {}\n  {} points, {} triangles, extent {:.6g} x {:.6g} x {:.6g} mm\n", info.path,
-                  info.kind, info.format, info.unit, info.points, info.triangles, extent.x(), extent.y(), extent.z());
+  std::string text = fmt::format("{}\n  {}, {}, unit {}{}\n  ", info.path, info.kind, info.format, info.unit,
+                                 info.unit_is_known ? "" : " (not stated)");
+  if (info.points > 0 || info.triangles == 0) text += fmt::format("{} points, ", info.points);
+  if (info.triangles > 0) text += fmt::format("{} triangles, ", info.triangles);
+  text += info.box.isEmpty() ? "no extent\n"
+                             : fmt::format("extent {:.6g} x {:.6g} x {:.6g} mm\n", extent.x(), extent.y(), extent.z());
   for (const ScanInfo& scan : info.scans) {
     const std::string viewpoint = scan.viewpoint ? fmt::format("{:.4g}, {:.4g}, {:.4g}", scan.viewpoint->x(),
                                                                scan.viewpoint->y(), scan.viewpoint->z())

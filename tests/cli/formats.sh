@@ -21,6 +21,13 @@ grep -q '"has_intensities": true' stdout || fail "--columns was not followed"
 printf 'LASF' >short.las
 expect 3 info short.las
 says short.las truncated
+# A size that nothing has is told, and how to say the unit; what states its unit, or is said, is not doubted.
+printf '0 0 1\n0.2 0 1\n0 0.1 1\n' >metres.xyz
+expect 0 info metres.xyz
+grep -q 'unit mm (not stated)' stdout || fail "nothing says that the unit was guessed"
+grep -q 'scan-unit m ' stdout || fail "a scan of 0.2 mm is not doubted"
+expect 0 info metres.xyz --unit m
+! grep -q 'not stated)\|scan-unit' stdout || fail "a unit that was said is doubted"
 
 # ---- files of other software, where they are
 if [ -d "$data/formats" ]; then
@@ -32,6 +39,8 @@ if [ -d "$data/formats" ]; then
   one "$data/formats/no-points.las" 0 1
   expect 3 info "$data/formats/bad-crc.e57"
   says 'page 0 is damaged'
+  expect 0 info "$data/pcl_milk/milk.pcd"
+  grep -q 'scan-unit m ' stdout || fail "a carton of 0.3 mm is not doubted"
 fi
 if [ -d "$data/cad" ]; then
   if "$asbuilt" info "$data/cad/frame.step" --json >stdout 2>stderr; then

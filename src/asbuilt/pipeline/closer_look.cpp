@@ -42,6 +42,7 @@ Result<io::ScanFile> read_around(const std::vector<verify::Detection>& placement
   const auto sieve = sieve_for(path, MemoryBudget(options.memory_gb), context);
   sieve->announced = {};  // said already
   sieve->wants = around(placements, thinned, model);
+  reading.context = context;
   reading.sieve = sieve;
   ASBUILT_TRY(files, io::read_scans(path, reading));
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while reading a scan once more");

@@ -280,6 +280,7 @@ InputFile read_input(const std::string& path, const Options& options, const Cont
   const auto content = io::FileContent::open(path);
   if (!content) return {path, "", tl::unexpected(content.error())};
   io::ReadOptions reading = scan_reading(options, path);
+  reading.context = context;
   reading.sieve = sieve_for(path, MemoryBudget(options.memory_gb), context);
   InputFile input{path, io::sha256(content->view()), io::scans_in(path, content->view(), reading)};
   if (const auto whole = content->whole(); !whole) input.scans = tl::unexpected(whole.error());
@@ -330,6 +331,7 @@ void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFold
     io::ReadOptions reading = scan_reading(half.options, scan.path);
     const auto sieve = sieve_for(scan.path, MemoryBudget(half.options.memory_gb), context);
     sieve->announced = {};  // said when it was read first
+    reading.context = context;
     reading.sieve = sieve;
     const auto files = io::read_scans(scan.path, reading);
     if (!files || static_cast<std::size_t>(scan.index_in_file) >= files->size()) continue;
