@@ -9,8 +9,8 @@
 #include <type_traits>
 
 #include "../program.h"
-#include "peer.h"
 #include "asbuilt/graph/pose_graph.h"
+#include "peer.h"
 #include "summary.h"
 #include "trial.h"
 
@@ -102,7 +102,8 @@ Result<void> apply(Options& options, const std::string& setting) {
     found = true;
   });
   if (found) return {};
-  return fail(ErrorCode::invalid_argument, fmt::format("--set {}: expected NAME=NUMBER of an option of graph or refinement", setting));
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("--set {}: expected NAME=NUMBER of an option of graph or refinement", setting));
 }
 
 // One scene, one start, for development.
@@ -130,8 +131,9 @@ Result<void> run_one(const Arguments& args) {
                  hold.sigma_mm[5] / scene.noise_sigma_mm, hold.loose.empty() ? "" : ", loose");
       for (const refine::LooseMotion& loose : hold.loose) {
         const Eigen::Vector3d& d = loose.motion.direction;
-        fmt::print("    {} ({:.2f}, {:.2f}, {:.2f}) {}\n", loose.motion.is_turn ? "turn" : "slide", d.x(), d.y(), d.z(),
-                   loose.unheld ? std::string("unheld") : fmt::format("{:.2f} sigma", loose.sigma_mm / scene.noise_sigma_mm));
+        fmt::print(
+            "    {} ({:.2f}, {:.2f}, {:.2f}) {}\n", loose.motion.is_turn ? "turn" : "slide", d.x(), d.y(), d.z(),
+            loose.unheld ? std::string("unheld") : fmt::format("{:.2f} sigma", loose.sigma_mm / scene.noise_sigma_mm));
       }
     }
     std::fflush(stdout);
