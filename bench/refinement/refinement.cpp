@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "../program.h"
+#include "asbuilt/graph/pose_graph.h"
 #include "peer.h"
 #include "summary.h"
 #include "trial.h"
@@ -19,7 +20,7 @@ namespace {
 struct Arguments {
   std::filesystem::path out;
   std::vector<std::string> folders, settings;
-  std::vector<int> scans{8, 128};
+  std::vector<int> scans{8, 128}, own;
   double angle = 0.0, shift = 0.0;
   int seeds = 10, count = 40, first = 0, scenes = 20, threads = 0;
 };
@@ -85,7 +86,8 @@ Result<void> run_scale(const Arguments& args) {
   return append(args, trials);
 }
 
-Result<void> apply(refine::RefineOptions& options, const std::string& setting) {
+template <class Options>
+Result<void> apply(Options& options, const std::string& setting) {
   const auto at = setting.find('=');
   bool found = false;
   for_each_field(options, [&](std::string_view field, auto& target, std::string_view) {
@@ -100,24 +102,50 @@ Result<void> apply(refine::RefineOptions& options, const std::string& setting) {
     found = true;
   });
   if (found) return {};
-  return fail(ErrorCode::invalid_argument, fmt::format("--set {}: expected NAME=NUMBER of a refine option", setting));
+  return fail(ErrorCode::invalid_argument,
+              fmt::format("--set {}: expected NAME=NUMBER of an option of graph or refinement", setting));
 }
 
 // One scene, one start, for development.
 Result<void> run_one(const Arguments& args) {
   refine::RefineOptions options;
-  for (const std::string& setting : args.settings) ASBUILT_CHECK(apply(options, setting));
-  return for_each_folder(args, [&](const RefinementScene& scene, const Context& context) -> Result<std::vector<Trial>> {
+  graph::PoseGraphOptions graph_options;
+  for (const std::string& setting : args.settings) {
+    if (!apply(graph_options, setting)) ASBUILT_CHECK(apply(options, setting));
+  }
+  const auto one = [&](const RefinementScene& scene, const Context& context) -> Result<std::vector<Trial>> {
     const AccuracyJudge judge(scene);
-    ASBUILT_TRY(run, joint_run(scene, perturbed(scene, args.angle, args.shift, 0), options, context));
+    ASBUILT_TRY(run, joint_run(scene, perturbed(scene, args.angle, args.shift, 0), options, context, graph_options));
     const Accuracy accuracy = judge.judge(run.poses, context, run.members);
     fmt::print("{}: {} links, {} dropped, {} of {} together, {:.3f} sigma, ratio {:.4f}, {} iterations{}, {:.2f} s\n",
                scene.name, run.links, run.dropped.size(), run.members.size(), scene.views.size(),
                accuracy.relative_pose_error_sigma, accuracy.ratio_to_oracle(), run.iterations,
                run.converged ? "" : " (not converged)", run.seconds);
+    for (std::size_t i = 0; i < run.members.size(); ++i) {
+      const std::vector<int> pair{run.members[static_cast<std::size_t>(run.refinement.fixed_view)], run.members[i]};
+      if (run.refinement.view_holds.empty() || pair[0] == pair[1]) continue;
+      const auto& hold = run.refinement.view_holds[i];
+      fmt::print("  {} against {}: {:.2f} sigma; 1 sigma of the hold {:.2f} to {:.3f} sigma{}\n",
+                 scene.names[static_cast<std::size_t>(pair[1])], scene.names[static_cast<std::size_t>(pair[0])],
+                 judge.relative_pose_error(run.poses, pair), hold.sigma_mm[0] / scene.noise_sigma_mm,
+                 hold.sigma_mm[5] / scene.noise_sigma_mm, hold.loose.empty() ? "" : ", loose");
+      for (const refine::LooseMotion& loose : hold.loose) {
+        const Eigen::Vector3d& d = loose.motion.direction;
+        fmt::print(
+            "    {} ({:.2f}, {:.2f}, {:.2f}) {}\n", loose.motion.is_turn ? "turn" : "slide", d.x(), d.y(), d.z(),
+            loose.unheld ? std::string("unheld") : fmt::format("{:.2f} sigma", loose.sigma_mm / scene.noise_sigma_mm));
+      }
+    }
     std::fflush(stdout);
     return std::vector<Trial>{};
-  });
+  };
+  ASBUILT_CHECK(for_each_folder(args, one));
+  const Context context(args.threads);
+  for (const int number : args.own) {
+    ASBUILT_TRY(scene, own_scene(number, context));
+    ASBUILT_CHECK(one(scene, context));
+  }
+  return {};
 }
 
 int run(int argc, char** argv) {
@@ -138,7 +166,9 @@ int run(int argc, char** argv) {
   CLI::App* summary = app.add_subcommand("summary", "tables and pictures of what was run");
   CLI::App* one = app.add_subcommand("one", "one start, printed");
   for (CLI::App* command : {starts, ablation, wrong, own, scale, peer, summary}) with_out(command);
-  for (CLI::App* command : {starts, ablation, peer, one}) with_folders(command);
+  for (CLI::App* command : {starts, ablation, peer}) with_folders(command);
+  one->add_option("folders", args.folders, "folders with truth.json");
+  one->add_option("--own", args.own, "numbers of scenes of our own simulator");
   wrong->add_option("folders", args.folders, "folders with truth.json");
   wrong->add_option("--own", args.scenes, "scenes of our own simulator after them")->default_val(0);
   wrong->add_option("--first", args.first, "first seed");

@@ -13,6 +13,7 @@
 
 #include "asbuilt/core/random.h"
 #include "asbuilt/graph/pose_graph.h"
+#include "asbuilt/refine/gauge.h"
 #include "asbuilt/refine/link_evidence.h"
 #include "asbuilt/refine/suspicious_view.h"
 #include "asbuilt/simulate/parts.h"
@@ -109,6 +110,12 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
   run.poses = poses_of(views);
   std::vector<int> left(views.size());
   std::iota(left.begin(), left.end(), 0);
+  if (!options.paper_mode) {
+    for (refine::View& view : views) {
+      ASBUILT_TRY(near, refine::start_near_model(view, *scene.prepared.surface, scene.diameter_mm(), context));
+      view.model_from_scan = near;
+    }
+  }
   const std::vector<refine::View> start = views;
   constexpr int kMostRounds = 3;
   for (int round = 1;; ++round) {
@@ -140,6 +147,7 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     run.links = links.size();
     run.iterations = refinement.iterations;
     run.converged = refinement.converged;
+    run.refinement = refinement;
     run.seconds = watch.seconds();
     run.cpu_seconds = watch.cpu_seconds();
     if (settled || round == kMostRounds || options.paper_mode) return run;

@@ -29,6 +29,7 @@ struct JointRun {
   std::size_t links = 0;
   int iterations = 0;
   bool converged = false;
+  refine::Refinement refinement;  ///< the last one, of the members
   double seconds = 0.0;      ///< graph and refinement, trees and normals included
   double cpu_seconds = 0.0;  ///< the same, processor time of all threads
 };

@@ -98,6 +98,15 @@ Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, con
   return scans;
 }
 
+Result<void> start_near_model(std::vector<PosedScan>& scans, const LoadedModel& model, const Context& context) {
+  for (PosedScan& scan : scans) {
+    const refine::View view{scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint};
+    ASBUILT_TRY(start, refine::start_near_model(view, *model.prepared.surface, model.prepared.diameter, context));
+    scan.model_from_local_start = start;
+  }
+  return {};
+}
+
 Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
                               const Context& context) {
   std::vector<graph::PosedSegment> segments;

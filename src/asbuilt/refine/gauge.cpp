@@ -17,7 +17,11 @@ namespace asbuilt::refine {
 namespace {
 
 constexpr std::size_t kPointsPerView = 6000, kPoints = 6000;
-constexpr double kReachRatio = 0.05;  // of the diameter
+constexpr double kReachRatio = 0.05;       // of the diameter
+constexpr double kRoughReachRatio = 0.15;  // a start 6 degrees and 5 % off leaves points so far away
+constexpr std::size_t kRoughPoints = 2000;
+constexpr double kRoughOffRatio = 0.01;  // of the diameter: further off than parts deviate from their CAD ...
+constexpr double kRoughShare = 0.1;      // ... if it is more of the points than a few dents explain
 constexpr double kTukeyTuning = 4.685;
 constexpr double kScaleDecay = 0.5;   // of the loss from step to step, at most
 constexpr double kSameSide = 0.3;     // cosine between scan normal and surface normal
@@ -61,8 +65,9 @@ struct Sums {
 
 class GaugeFit {
  public:
-  GaugeFit(const PointCloud& points, const model::SurfaceDistance& surface, double diameter, const Context& context)
-      : points_(points), surface_(surface), diameter_(diameter), context_(context) {
+  GaugeFit(const PointCloud& points, const model::SurfaceDistance& surface, double diameter, double reach_ratio,
+           const Context& context)
+      : points_(points), surface_(surface), diameter_(diameter), reach_(reach_ratio * diameter), context_(context) {
     for (const Eigen::Vector3f& point : points.positions) centre_ += point.cast<double>();
     centre_ /= static_cast<double>(points.size());
     double squares = 0.0;
@@ -71,7 +76,7 @@ class GaugeFit {
   }
 
   Result<Pose> run() {
-    double scale = kReachRatio * diameter_;
+    double scale = reach_;
     double damping = 1e-6;
     std::vector<Residual> residuals = residuals_at(pose_);
     for (int iteration = 0; iteration < kMaxSteps; ++iteration) {
@@ -83,7 +88,7 @@ class GaugeFit {
       const Sums sums = sums_of(residuals, scale);
       if (!(sums.weight > 0.0)) {
         return fail(ErrorCode::not_possible,
-                    fmt::format("no scanned point lies within {:.3g} mm of the CAD surface", kReachRatio * diameter_));
+                    fmt::format("no scanned point lies within {:.3g} mm of the CAD surface", reach_));
       }
       double motion = 0.0;
       for (int attempt = 0; attempt < 8; ++attempt) {
@@ -105,13 +110,22 @@ class GaugeFit {
     return pose_;
   }
 
+  // Share of the points that lie further off the CAD than parts deviate from theirs, or face away from it.
+  [[nodiscard]] double share_off(const Pose& pose) const {
+    std::size_t off = 0;
+    for (const Residual& residual : residuals_at(pose)) {
+      off += residual.used && std::abs(residual.distance) <= kRoughOffRatio * diameter_ ? 0 : 1;
+    }
+    return static_cast<double>(off) / static_cast<double>(points_.size());
+  }
+
  private:
   [[nodiscard]] std::vector<Residual> residuals_at(const Pose& pose) const {
     std::vector<Residual> residuals(points_.size());
     parallel_for(context_, points_.size(), 256, [&](std::size_t i) {
       const Eigen::Vector3d position = pose * points_.positions[i].cast<double>();
       const Eigen::Vector3d normal = pose.linear() * points_.normals[i].cast<double>();
-      const auto nearest = surface_.nearest(position, kReachRatio * diameter_);
+      const auto nearest = surface_.nearest(position, reach_);
       if (!nearest.found() || nearest.on_open_edge) return;
       Residual& residual = residuals[i];
       residual.position = position;
@@ -174,7 +188,7 @@ class GaugeFit {
 
   const PointCloud& points_;
   const model::SurfaceDistance& surface_;
-  double diameter_;
+  double diameter_, reach_;
   const Context& context_;
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   double length_ = 1.0;
@@ -199,7 +213,30 @@ Result<Pose> best_fit_gauge(std::span<const View> views, std::span<const Pose> r
   }
   const PointCloud points = even_union(views, refined_from_scan, context);
   if (points.empty()) return fail(ErrorCode::not_possible, "there are no scanned points to fit to the CAD");
-  return GaugeFit(points, surface, diameter_mm, context).run();
+  return GaugeFit(points, surface, diameter_mm, kReachRatio, context).run();
+}
+
+Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,
+                              const Context& context) {
+  if (!(diameter_mm > 0.0 && std::isfinite(diameter_mm))) {
+    return fail(ErrorCode::invalid_argument, fmt::format("the diameter is {} mm", diameter_mm));
+  }
+  if (view.segment_in_scan.normals.size() != view.segment_in_scan.size()) {
+    return fail(ErrorCode::invalid_argument, "the view has not one normal a point");
+  }
+  if (view.segment_in_scan.empty()) return view.model_from_scan;
+  PointCloud points = evenly_sampled(view.segment_in_scan, kRoughPoints, context);
+  for (Eigen::Vector3f& point : points.positions) point = (view.model_from_scan * point.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& normal : points.normals) {
+    normal = (view.model_from_scan.linear() * normal.cast<double>()).cast<float>();
+  }
+  GaugeFit fit(points, surface, diameter_mm, kRoughReachRatio, context);
+  const double before = fit.share_off(Pose::Identity());
+  if (before <= kRoughShare) return view.model_from_scan;
+  const auto motion = fit.run();
+  if (!motion && motion.error().code == ErrorCode::cancelled) return motion;
+  if (!motion || fit.share_off(*motion) > 0.5 * before) return view.model_from_scan;  // no better there
+  return orthonormalised(*motion * view.model_from_scan);
 }
 
 }  // namespace asbuilt::refine

@@ -194,5 +194,55 @@ TEST(BestFitGauge, RefusesWhatCannotBeFitted) {
   EXPECT_FALSE(best_fit_gauge(views, here, surface, 0.0, Context(1)));
 }
 
+// What a sensor above, to the right and in front sees of the block, at a true pose that is the identity.
+View seen_from_above(const TriangleMesh& mesh) {
+  const Eigen::Vector3f sensor(0.6F, -0.5F, 1.0F);
+  const PointCloud all = points_of(mesh, 60, 0.05, 7);
+  View view;
+  view.noise_sigma_mm = 0.05;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (all.normals[i].dot(sensor) <= 0.0F) continue;
+    view.segment_in_scan.positions.push_back(all.positions[i]);
+    view.segment_in_scan.normals.push_back(all.normals[i]);
+  }
+  return view;
+}
+
+TEST(StartNearModel, BringsAStartThatIsSixDegreesAndFivePercentOffToTheCad) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  const Eigen::Vector3d middle(50.0, 30.0, 20.0);
+  View view = seen_from_above(mesh);
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    Random random(seed, "rough start", 0);
+    const Eigen::Vector3d shift = 0.05 * diameter(mesh) * test::random_direction(random);
+    view.model_from_scan = Eigen::Translation3d(middle + shift) *
+                           Eigen::AngleAxisd(6.0 * 3.14159265358979 / 180.0, test::random_direction(random)) *
+                           Eigen::Translation3d(-middle);
+    const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
+    EXPECT_LT(worst_displacement(mesh, start), 0.1) << "seed " << seed;  // two sigma; the start was 8 to 12 mm off
+  }
+}
+
+TEST(StartNearModel, LeavesAPoseAloneThatDeviatesAsPartsDo) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  View view = seen_from_above(mesh);
+  Vector6d twist;
+  twist << 0.002, -0.001, 0.002, 0.4, -0.3, 0.3;  // 0.5 % of the diameter
+  view.model_from_scan = pose_from_twist(twist);
+  const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
+  EXPECT_EQ(start.matrix(), view.model_from_scan.matrix());
+}
+
+TEST(StartNearModel, KeepsAPoseThatTheCadDoesNotExplain) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  View view = seen_from_above(mesh);
+  for (Eigen::Vector3f& point : view.segment_in_scan.positions) point *= 1.6F;  // another thing
+  const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
+  EXPECT_EQ(start.matrix(), view.model_from_scan.matrix());
+}
+
 }  // namespace
 }  // namespace asbuilt::refine
