@@ -6,16 +6,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <span>
 #include <stdexcept>
 
 #include "../program.h"
+#include "../stopwatch.h"
 #include "asbuilt/core/random.h"
 #include "asbuilt/io/e57_writer.h"
 #include "asbuilt/io/ply_writer.h"
@@ -32,12 +31,6 @@ constexpr int kRounds = 3;
 struct Seconds {
   double wall = 1e30, processor = 1e30;
 };
-
-double processor_s() {
-  std::timespec now{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// A wavy floor of 6 m by 6 m with noise.
 std::vector<Eigen::Vector3f> scanned_floor(std::size_t count) {
@@ -90,13 +83,9 @@ class Timed {
       : name_(std::move(name)), read_(std::move(read)) {}
 
   void run() {
-    const auto wall = std::chrono::steady_clock::now();
-    const double processor = processor_s();
+    const Stopwatch watch;
     Seconds seconds;
-    const auto stop = [&] {
-      seconds.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall).count();
-      seconds.processor = processor_s() - processor;
-    };
+    const auto stop = [&] { seconds = {watch.seconds(), watch.cpu_seconds()}; };
     points_ = read_(stop);
     best_ = {std::min(best_.wall, seconds.wall), std::min(best_.processor, seconds.processor)};
   }
