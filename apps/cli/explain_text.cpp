@@ -9,6 +9,8 @@
 #include <numbers>
 #include <optional>
 
+#include "asbuilt/verify/verdict.h"
+
 namespace asbuilt::cli {
 namespace {
 
@@ -105,9 +107,10 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
   text += fmt::format(", {:.2f} of the distance that counts as on it{}; 0.58 would be no fit at all.\n",
                       best.residual_ratio, limit(record, "max_residual_ratio", "allowed:", 1.0, ""));
   const auto least = option_of(record, "min_weakest_direction");
-  const double missing_share = std::isnan(best.missing_share) ? 0.0 : best.missing_share;
-  const double surcharge = option_of(record, "missing_hold_surcharge").value_or(0.0) * missing_share;
-  const double needed = least ? *least * (1.0 + surcharge) : 0.0;
+  verify::VerifyOptions limits;
+  limits.min_weakest_direction = least.value_or(0.0);
+  limits.missing_hold_surcharge = option_of(record, "missing_hold_surcharge").value_or(0.0);
+  const double needed = verify::hold_needed(std::isnan(best.missing_share) ? 0.0 : best.missing_share, limits);
   text += fmt::format(
       "  Hold: {:.4f}{} in the direction in which the surface that was found lets the part slide or turn most easily; "
       "0 would be free",

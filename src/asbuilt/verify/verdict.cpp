@@ -65,7 +65,7 @@ bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
 bool is_held(const Candidate& c, const VerifyOptions& options) {
   constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
   const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
-  const double needed = hold_needed(c, options);
+  const double needed = hold_needed(c.missing_share, options);
   return c.weakest_direction >= needed || is_held_by_edges(c, options) || (c.weakest_but_near >= needed && holds_turn);
 }
 
@@ -127,7 +127,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
     return {Reason::under_constrained,
             fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
                         "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
-                        c.weakest_direction, hold_needed(c, options), std::max(0.0, c.slip_lead),
+                        c.weakest_direction, hold_needed(c.missing_share, options), std::max(0.0, c.slip_lead),
                         edge_measurements_needed(c, options))};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
@@ -159,7 +159,7 @@ bool refutes(Reason objection) {
 // Whether it clears every limit by so much that a search of the whole scan could not unsettle it.
 bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
   constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
-  const bool is_held_firmly = c.weakest_direction >= kTwice * hold_needed(c, options) ||
+  const bool is_held_firmly = c.weakest_direction >= kTwice * hold_needed(c.missing_share, options) ||
                               c.slip_lead >= kTwice * edge_measurements_needed(c, options);
   return objection(c, options).reason == Reason::none && is_held_firmly &&
          proof(c) >= proof_needed(c, options) + kProofToSpare &&
@@ -170,8 +170,8 @@ bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
 // One flat face between edges fits other things too, now and then: that is no second part, and no better one, beside a
 // pose that the surface holds beyond doubt.
 bool is_outshone(const Candidate& c, const Candidate& other, const VerifyOptions& options) {
-  return c.weakest_direction < hold_needed(c, options) && !is_beyond_doubt(c, options) &&
-         other.weakest_direction >= hold_needed(other, options) && is_beyond_doubt(other, options);
+  return c.weakest_direction < hold_needed(c.missing_share, options) && !is_beyond_doubt(c, options) &&
+         other.weakest_direction >= hold_needed(other.missing_share, options) && is_beyond_doubt(other, options);
 }
 
 enum class Outcome { first, second, undecided };
@@ -266,7 +266,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     // Along what hardly more than edges hold, a little more surface is found at a wrong pose as easily as at the right
     // one.
     constexpr double kTwice = 2.0;
-    const bool is_firm = best.weakest_direction >= kTwice * hold_needed(best, options);
+    const bool is_firm = best.weakest_direction >= kTwice * hold_needed(best.missing_share, options);
     const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
@@ -281,7 +281,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
 
 // Whether it is loose in nothing but turns about the part's axes of near-symmetry.
 bool is_loose_in_turn_only(Candidate c, const VerifyOptions& options) {
-  if (options.paper_mode || c.weakest_but_near < hold_needed(c, options)) return false;
+  if (options.paper_mode || c.weakest_but_near < hold_needed(c.missing_share, options)) return false;
   c.weakest_direction = c.weakest_but_near;
   return objection(c, options).reason == Reason::none;
 }
@@ -342,8 +342,8 @@ const char* code_of(Reason reason) {
   return "";
 }
 
-double hold_needed(const Candidate& candidate, const VerifyOptions& options) {
-  return options.min_weakest_direction * (1.0 + options.missing_hold_surcharge * candidate.missing_share);
+double hold_needed(double missing_share, const VerifyOptions& options) {
+  return options.min_weakest_direction * (1.0 + options.missing_hold_surcharge * missing_share);
 }
 
 double displacement_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {

@@ -28,9 +28,9 @@ namespace asbuilt::verify {
                                                     double least_apart_mm, const model::PreparedModel& model,
                                                     const VerifyOptions& options);
 
-/// The `weakest_direction` that a candidate needs to be held by the surface that was found: the more, the more of the
-/// surface that should be visible returned nothing, for there nothing can deny the pose.
-[[nodiscard]] double hold_needed(const Candidate& candidate, const VerifyOptions& options);
+/// The `weakest_direction` that a candidate needs to be held by the surface that was found: the more, the larger the
+/// share of the surface that should be visible and returned nothing, for there nothing can deny the pose.
+[[nodiscard]] double hold_needed(double missing_share, const VerifyOptions& options);
 
 /// Whether a rival is nearly as well proven as the best candidate and explains a fair part of what that one does.
 /// Clutter that passes the thresholds alone is not a second part beside a clear first.

@@ -277,9 +277,9 @@ class Judge::Verification {
     constexpr double kShare = 0.2;
     if (options_.paper_mode || candidates.empty()) return candidates;
     const double least = kShare * candidates.front().support;
-    candidates.erase(std::remove_if(candidates.begin() + 1, candidates.end(),
-                                    [&](const Candidate& c) { return c.support < least; }),
-                     candidates.end());
+    candidates.erase(
+        std::remove_if(candidates.begin() + 1, candidates.end(), [&](const Candidate& c) { return c.support < least; }),
+        candidates.end());
     return candidates;
   }
 
@@ -328,14 +328,15 @@ class Judge::Verification {
       evidence = judged_densely();
     }
     const auto is_loose = [&] {
-      return !options_.paper_mode && candidate.weakest_direction < hold_needed(candidate, options_);
+      return !options_.paper_mode && candidate.weakest_direction < hold_needed(candidate.missing_share, options_);
     };
     // What edges show is read as finely as this part fits, not as deviating parts may.
     const double edge_distance =
         std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance_, final_distance_);
     const EvidenceOptions edge_options{edge_distance, lateral(edge_distance)};
     const auto settled = [&](const Pose& pose) {
-      return settled_between_edges(pose, evidence, model_, hold_needed(candidate, options_), evidence_, edge_options);
+      return settled_between_edges(pose, evidence, model_, hold_needed(candidate.missing_share, options_), evidence_,
+                                   edge_options);
     };
     if (is_loose() && may_have_drifted(candidate)) {
       const Pose drifted = candidate.model_from_scan;
@@ -346,7 +347,7 @@ class Judge::Verification {
     if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     constexpr int kMostMoves = 2;
     for (int move = 0; is_loose() && is_plausible(); ++move) {
-      candidate.loose_directions = loose_directions(evidence, model_, hold_needed(candidate, options_));
+      candidate.loose_directions = loose_directions(evidence, model_, hold_needed(candidate.missing_share, options_));
       const Slip rival = strongest_rival(candidate, evidence, around, edge_options);
       candidate.slip_lead = std::isfinite(rival.lead_over_it) ? rival.lead_over_it : 0.0;
       if (candidate.slip_lead >= 0.0 || move == kMostMoves) break;
@@ -374,7 +375,8 @@ class Judge::Verification {
     constexpr double kLeaderShare = 0.7;  // of the best support
     std::vector<Candidate> near;
     if (options_.paper_mode || candidates.empty()) return near;
-    const bool is_loose = candidates.front().weakest_direction < hold_needed(candidates.front(), options_);
+    const bool is_loose =
+        candidates.front().weakest_direction < hold_needed(candidates.front().missing_share, options_);
     const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : is_loose ? 1 : 0;
     for (std::size_t i = 0; i < std::min(leaders, candidates.size()); ++i) {
       if (candidates[i].support < kLeaderShare * candidates.front().support) break;
@@ -402,8 +404,9 @@ class Judge::Verification {
       if (slip.lead_over_it < strongest.lead_over_it) strongest = slip;
     };
     for (const double slip : kSlips) {
-      consider(strongest_slip(candidate.model_from_scan, evidence, model_, hold_needed(candidate, options_),
-                              slip * model_.diameter, evidence_, edge_options));
+      consider(strongest_slip(candidate.model_from_scan, evidence, model_,
+                              hold_needed(candidate.missing_share, options_), slip * model_.diameter, evidence_,
+                              edge_options));
     }
     if (strongest.lead_over_it > 0.0 && std::isfinite(strongest.lead_over_it)) {
       consider(strongest_far_slip(candidate, evidence, points_in_scan, edge_options));
@@ -421,8 +424,9 @@ class Judge::Verification {
     const Pose& model_from_scan = candidate.model_from_scan;
     Slip strongest;
     for (const double slip : kFarSlips) {
-      for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model_, hold_needed(candidate, options_),
-                                               slip * model_.diameter, Slips::single)) {
+      for (const Pose& slipped :
+           slipped_poses(model_from_scan, evidence, model_, hold_needed(candidate.missing_share, options_),
+                         slip * model_.diameter, Slips::single)) {
         const Pose there =
             lm_icp(points, slipped, model_, scan_.viewpoint, {1.5 * final_distance_, kMostIterations, only_facing()})
                 .model_from_scan;
