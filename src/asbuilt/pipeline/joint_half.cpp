@@ -69,7 +69,7 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
                     io::RunRecord& record, const Context& context) {
   constexpr int kMostRounds = 3;
   std::vector<PosedScan>& scans = registration.scans;
-  if (!options.paper_mode) ASBUILT_CHECK(start_near_model(scans, model, context));
+  if (!options.paper_mode) ASBUILT_CHECK(start_as_detected(scans, model, context));
   ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
   registration.graph = std::move(first_graph);
   for (int round = 1;; ++round) {
@@ -78,8 +78,7 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
     if (contradiction && round > 1) {
       drop(scans, *contradiction, record, context);
       restore_seen_through(scans);
-      for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
-      ASBUILT_CHECK(start_near_model(scans, model, context));
+      ASBUILT_CHECK(start_as_detected(scans, model, context));
       ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
       registration.graph = std::move(graph);
       round = 0;
