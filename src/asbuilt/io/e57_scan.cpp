@@ -96,8 +96,7 @@ struct ColourScale {
   std::array<double, 3> low{}, factor{};
 
   [[nodiscard]] std::uint8_t operator()(std::size_t channel, double value) const {
-    const double scaled = (value - low[channel]) * factor[channel];
-    return static_cast<std::uint8_t>(std::isfinite(scaled) ? std::clamp(scaled, 0.0, 255.0) + 0.5 : 0.0);
+    return nearest_byte((value - low[channel]) * factor[channel]);
   }
 };
 

@@ -48,11 +48,7 @@ PointValues<Rgb> colours_in(const PlyElement& element, const PlyTable& table) {
     std::array<double, kPointsAtOnce> numbers;
     for (std::size_t c = 0; c < 3; ++c) {
       columns[c].read(first, out.size(), numbers.data(), 1);
-      for (std::size_t i = 0; i < out.size(); ++i) {
-        // Rounded by adding a half, which is what std::round does with what is left after clamping.
-        const double value = std::clamp(numbers[i] * factor, 0.0, 255.0);
-        out[i][c] = static_cast<std::uint8_t>(std::isfinite(numbers[i]) ? value + 0.5 : 0.0);
-      }
+      for (std::size_t i = 0; i < out.size(); ++i) out[i][c] = nearest_byte(numbers[i] * factor);
     }
   };
 }

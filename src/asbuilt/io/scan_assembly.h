@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -60,6 +61,11 @@ struct RawPoints {
   /// Rows of equal size, if that is what the file holds: those that were read may leave memory.
   std::string_view rows;
 };
+
+/// The nearest of the numbers 0 to 255; 0 of what is not finite. Without std::round, a call for each point.
+[[nodiscard]] inline std::uint8_t nearest_byte(double value) {
+  return static_cast<std::uint8_t>(std::isfinite(value) ? std::clamp(value, 0.0, 255.0) + 0.5 : 0.0);
+}
 
 /// How many points decide on the offset, and which: evenly spread over the index range, the same for the same file.
 constexpr std::size_t kOffsetProbes = 1001;

@@ -38,11 +38,10 @@ std::function<bool(const Eigen::Vector3d&)> around(const std::vector<verify::Det
 Result<io::ScanFile> read_around(const std::vector<verify::Detection>& placements, const io::ScanFile& thinned,
                                  const model::PreparedModel& model, const Options& options, const Context& context) {
   const std::string path = thinned.path.string();
-  io::ReadOptions reading = scan_reading(options, path);
+  io::ReadOptions reading = scan_reading(options, path, context);
   const auto sieve = sieve_for(path, MemoryBudget(options.memory_gb), context);
   sieve->announced = {};  // said already
   sieve->wants = around(placements, thinned, model);
-  reading.context = context;
   reading.sieve = sieve;
   ASBUILT_TRY(files, io::read_scans(path, reading));
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while reading a scan once more");
