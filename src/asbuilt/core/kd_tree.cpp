@@ -135,8 +135,8 @@ struct Subtree {
   std::vector<Leaf> leaves;
 
   Box add(std::span<IndexedPoint> points) {
-    leaves.reserve(leaves.size() + points.size() / (kLeafSize / 2) + 1);
-    nodes.reserve(nodes.size() + 2 * (points.size() / (kLeafSize / 2) + 1));
+    leaves.reserve(points.size() / (kLeafSize / 2) + 1);
+    nodes.reserve(2 * leaves.capacity());
     return add_below(points);
   }
 
@@ -186,18 +186,18 @@ float squared_reach(float distance) {
 }  // namespace
 
 struct KdTree::Implementation {
-  explicit Implementation(std::span<const Eigen::Vector3f> source) : count(source.size()) {
-    std::vector<IndexedPoint> points = indexed(source);
-    if (!points.empty()) (void)tree.add(points);
-  }
-
-  Implementation(std::span<const Eigen::Vector3f> source, const Context& context) : count(source.size()) {
+  /// Without a context, by the calling thread alone.
+  Implementation(std::span<const Eigen::Vector3f> source, const Context* context) : count(source.size()) {
+    constexpr std::size_t kFewest = 20000, kParts = 32;  // fewer points are not worth a thread
     std::vector<IndexedPoint> points = indexed(source);
     if (points.empty()) return;
-    constexpr std::size_t kFewest = 20000, kParts = 32;  // fewer points are not worth a thread
+    if (context == nullptr || count <= kFewest) {
+      (void)tree.add(points);
+      return;
+    }
     std::vector<Part> parts;
     const std::size_t root = split(points, std::max(kFewest, count / kParts), parts);
-    parallel_for(context, parts.size(), 1, [&](std::size_t p) {
+    parallel_for(*context, parts.size(), 1, [&](std::size_t p) {
       Part& part = parts[p];
       if (part.left == kNoPart) part.box = part.subtree.add(part.points);
     });
@@ -309,8 +309,8 @@ struct KdTree::Implementation {
 };
 
 KdTree::KdTree(std::span<const Eigen::Vector3f> points, const Context& context)
-    : implementation_(std::make_unique<Implementation>(points, context)) {}
-KdTree::KdTree(std::span<const Eigen::Vector3f> points) : implementation_(std::make_unique<Implementation>(points)) {}
+    : implementation_(std::make_unique<Implementation>(points, &context)) {}
+KdTree::KdTree(std::span<const Eigen::Vector3f> points) : implementation_(std::make_unique<Implementation>(points, nullptr)) {}
 KdTree::~KdTree() = default;
 KdTree::KdTree(KdTree&&) noexcept = default;
 KdTree& KdTree::operator=(KdTree&&) noexcept = default;

@@ -11,7 +11,6 @@
 #include "asbuilt/core/cube_rows.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
-#include "asbuilt/core/voxel_grid.h"
 
 namespace asbuilt::scan {
 namespace {
@@ -96,17 +95,13 @@ class Neighbourhoods {
                  const KdTree& tree, std::size_t count)
       : points_(points), columns_(columns), cubes_(cubes), cube_mm_(cube_mm), tree_(tree), count_(count) {}
 
-  /// So that the run fits into a ball that is small beside the neighbourhoods. Places are those of the cubes' order.
-  [[nodiscard]] std::size_t end_of_run(std::size_t begin, std::size_t end) {
+  /// Gathers for a run that begins with the point at this place in the cubes' order, and says where it ends: it fits
+  /// into a ball that is small beside the neighbourhoods.
+  [[nodiscard]] std::size_t gather_run(std::size_t begin, std::size_t end) {
     constexpr std::size_t kMost = 32;
     const auto order = cubes_.order();
     if (reach_ == 0.0F) reach_ = reach_by_tree(points_[order[begin]]);
-    Eigen::AlignedBox3f box(points_[order[begin]]);
-    std::size_t at = begin + 1;
-    for (; at < std::min(end, begin + kMost); ++at) {
-      box.extend(points_[order[at]]);
-      if (box.diagonal().squaredNorm() > reach_ * reach_) break;
-    }
+    const std::size_t at = end_of_run(begin, end, kMost, reach_, [&](std::size_t k) { return points_[order[k]]; });
     gather(order.subspan(begin, at - begin));
     return at;
   }
@@ -153,11 +148,9 @@ class Neighbourhoods {
     Eigen::AlignedBox3f box;
     for (const std::uint32_t i : run) box.extend(points_[i]);
     const Eigen::Vector3f centre = box.center();
-    const float radius = std::sqrt([&] {
-      float largest = 0.0F;
-      for (const std::uint32_t i : run) largest = std::max(largest, (points_[i] - centre).squaredNorm());
-      return largest;
-    }());
+    float squared_radius = 0.0F;
+    for (const std::uint32_t i : run) squared_radius = std::max(squared_radius, (points_[i] - centre).squaredNorm());
+    const float radius = std::sqrt(squared_radius);
     gathered_reach_ = kRoom * reach_;
     reach_ = 0.0F;
     gathered_.resize(0);
@@ -248,15 +241,15 @@ PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const KdTr
   return plane_of(moments);
 }
 
-FittedNormals fitted_normals(std::span<const Eigen::Vector3f> points, const KdTree& tree, std::size_t count,
-                             const Context& context) {
+FittedNormals fitted_normals(std::span<const Eigen::Vector3f> points, const KdTree& tree, double spacing_mm,
+                             std::size_t count, const Context& context) {
   constexpr std::size_t kGrain = 2048;
   constexpr double kSpacingsPerCube = 3.0;
   FittedNormals fitted;
   fitted.normals.resize(points.size());
   fitted.variation.resize(points.size());
   if (points.empty() || count == 0) return fitted;
-  const double cube_mm = kSpacingsPerCube * std::max(median_spacing(points, tree), 1e-9);
+  const double cube_mm = kSpacingsPerCube * std::max(spacing_mm, 1e-9);
   const CubeRows cubes(points, cube_mm);
   const auto order = cubes.order();
   ASBUILT_EXPECT(order.size() == points.size(), "finite points");
@@ -271,7 +264,7 @@ FittedNormals fitted_normals(std::span<const Eigen::Vector3f> points, const KdTr
     Neighbourhoods neighbourhoods(points, columns, cubes, static_cast<float>(cube_mm), tree,
                                   std::min(count, points.size()));
     for (std::size_t from = begin, to = begin; from < end; from = to) {
-      to = neighbourhoods.end_of_run(from, end);
+      to = neighbourhoods.gather_run(from, end);
       for (std::size_t k = from; k < to; ++k) {
         const PlaneFit plane = plane_of(neighbourhoods.moments_about(points[order[k]]));
         fitted.normals[order[k]] = plane.normal;

@@ -81,8 +81,8 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.spacing_mm = median_spacing(scan.cloud.positions, tree);
   scan.noise_sigma_mm =
       options.noise_sigma_mm > 0.0 ? options.noise_sigma_mm : estimate_noise(scan.cloud.positions, tree, context);
-  FittedNormals fitted =
-      fitted_normals(scan.cloud.positions, tree, neighbours_for_normals(scan.noise_sigma_mm, scan.spacing_mm), context);
+  FittedNormals fitted = fitted_normals(scan.cloud.positions, tree, scan.spacing_mm,
+                                        neighbours_for_normals(scan.noise_sigma_mm, scan.spacing_mm), context);
   scan.cloud.normals = std::move(fitted.normals);
   scan.surface_variation = std::move(fitted.variation);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");

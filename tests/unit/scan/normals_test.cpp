@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/scan/scan.h"
 #include "unit/scan/clouds.h"
 
@@ -100,7 +101,7 @@ PlaneFit by_brute_force(const std::vector<Eigen::Vector3f>& points, std::size_t 
 
 void expect_those_of_brute_force(const std::vector<Eigen::Vector3f>& points, std::size_t count) {
   const KdTree tree(points);
-  const FittedNormals fitted = fitted_normals(points, tree, count, Context(2));
+  const FittedNormals fitted = fitted_normals(points, tree, median_spacing(points, tree), count, Context(2));
   ASSERT_EQ(fitted.normals.size(), points.size());
   for (std::size_t i = 0; i < points.size(); i += 7) {
     const PlaneFit plane = by_brute_force(points, i, count);
@@ -135,14 +136,14 @@ TEST(FittedNormals, OfEquallyNearPointsGoByTheIndex) {
 TEST(FittedNormals, OfFewPointsAreThoseOfAll) {
   expect_those_of_brute_force(test::plane_cloud(5.0, 1.0, 20.0, 0.3, 5).positions, 60);
   const std::vector<Eigen::Vector3f> two{{0, 0, 0}, {1, 0, 0}};
-  EXPECT_TRUE(fitted_normals(two, KdTree(two), 12, Context(2)).normals[0].isZero(0.0F));
+  EXPECT_TRUE(fitted_normals(two, KdTree(two), 1.0, 12, Context(2)).normals[0].isZero(0.0F));
 }
 
 TEST(FittedNormals, AreTheSameWhateverTheThreads) {
   const std::vector<Eigen::Vector3f> points = test::sphere_cloud({0, 0, 600}, 80.0, 9000, -0.5, 0.2, 3).positions;
   const KdTree tree(points);
-  const FittedNormals one = fitted_normals(points, tree, 30, Context(1));
-  const FittedNormals three = fitted_normals(points, tree, 30, Context(3));
+  const FittedNormals one = fitted_normals(points, tree, 1.0, 30, Context(1));
+  const FittedNormals three = fitted_normals(points, tree, 1.0, 30, Context(3));
   EXPECT_EQ(one.variation, three.variation);
   EXPECT_TRUE(std::ranges::equal(one.normals, three.normals));
 }
