@@ -87,6 +87,7 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.surface_variation = std::move(fitted.variation);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
   scan.viewpoint = choose_viewpoint(scan, file_normals, file_viewpoint, request, scan.warnings);
+  scan.spacing_by_range = SpacingByRange(scan.cloud.positions, tree, scan.viewpoint);
   scan.normals_oriented = orient_normals(scan, file_normals, options.use_file_normals, context);
   return scan;
 }

@@ -36,6 +36,9 @@ struct ScanEvidence {
 /// Surfaces seen flatter than this cosine of the incidence (78 degrees) return too little to be asked for.
 inline constexpr double kGrazing = 0.2;
 
+/// Distance between neighbouring measurements, mm, where a pose puts the middle of the model.
+[[nodiscard]] double spacing_at(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan);
+
 /// Cosine of the incidence at which the sensor looks on a sample of the model; nothing if it is averted or grazing, or
 /// if the part itself is in the way. Open skins are seen from either side. `towards_sensor` is a unit vector in the
 /// scan.
@@ -78,6 +81,10 @@ struct EvidenceOptions {
   double lateral_mm = 1.0;   ///< how far along the surface the next measurement may be
   std::size_t most_samples = std::numeric_limits<std::size_t>::max();
 };
+
+/// `lateral_mm` where the sensor looks on a surface at this cosine of the incidence, 0 where it is not known: beyond 53
+/// degrees, rays meet the surface ever farther apart.
+[[nodiscard]] double lateral_at(const EvidenceOptions& options, double cosine);
 
 /// Asks the scan about every one of `samples` (oriented, in the model frame), or the first `most_samples` of them.
 [[nodiscard]] PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples,
