@@ -27,10 +27,15 @@ double proof(const Candidate& c) {
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn) * (1.0 - c.overrun_share);
 }
 
-// What others hide and what returned nothing can lie, and without rays little can be refuted, so that what was found
-// must prove the more.
+bool surface_holds(const Candidate& c, const VerifyOptions& options) {
+  return std::max(c.weakest_direction, c.weakest_but_near) >= hold_needed(c.missing_share, options);
+}
+
+// What others hide and what returned nothing can lie, anything next to an edge can feign it, and without rays little can
+// be refuted, so that what was found must prove the more.
 double proof_needed(const Candidate& c, const VerifyOptions& options) {
   return options.min_proof + options.hidden_surcharge * c.hidden_share + options.missing_surcharge * c.missing_share +
+         (surface_holds(c, options) ? 0.0 : options.edges_surcharge) +
          (c.without_rays ? options.no_rays_surcharge : 0.0);
 }
 

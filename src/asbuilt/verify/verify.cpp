@@ -593,6 +593,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
+  ASBUILT_CHECK(expect_between("edges_surcharge", edges_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("no_rays_surcharge", no_rays_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("missing_hold_surcharge", missing_hold_surcharge, 0.0, 100.0));

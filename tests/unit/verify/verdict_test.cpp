@@ -134,6 +134,7 @@ TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
 TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
+  candidate.residual_ratio = 0.05;  // proves enough without rays
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
   candidate.without_rays = true;
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
@@ -168,6 +169,17 @@ TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
+TEST(Verdict, AsksForMoreProofWhereOnlyEdgesHoldThePose) {
+  Candidate candidate = flawless();
+  candidate.score = 0.8, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.42
+  candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.weakest_direction = 0.0;  // 0.34 + 0.12 = 0.46
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  candidate.residual_ratio = 0.1;  // proves 0.53
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
 TEST(Verdict, AsksForMoreProofWhereNoRayCanRefuteThePose) {
   Candidate candidate = flawless();
   candidate.score = 0.9, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.53
@@ -182,7 +194,7 @@ TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
   Candidate candidate = flawless();
   candidate.contradiction_share = 0.028;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.overrun_share = 0.09;
+  candidate.overrun_share = 0.03;  // 0.93 and 0.25 of their limits
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
   candidate.contradiction_share = 0.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
