@@ -133,6 +133,12 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_dis
   return {coarse, middle, fine};
 }
 
+Segment segment_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                   const std::vector<std::uint8_t>& background, double score_distance_mm, const Context& context) {
+  const SegmentOptions segmentation{std::max(score_distance_mm, 0.0075 * model.diameter), 0.03 * model.diameter, 0.8};
+  return segment_part(model_from_scan, model, scan, background, segmentation, context);
+}
+
 // In random order, so that the first few of any region are spread over it.
 std::vector<Eigen::Vector3f> shuffled(std::vector<Eigen::Vector3f> points) {
   Random random(0, "registration points", points.size());
@@ -362,8 +368,7 @@ class Judge::Verification {
   }
 
   void cut_out(Detection& detection) const {
-    const SegmentOptions segmentation{std::max(final_distance_, 0.0075 * model_.diameter), 0.03 * model_.diameter, 0.8};
-    Segment segment = segment_part(detection.best.model_from_scan, model_, scan_, background_, segmentation, context_);
+    Segment segment = segment_at(detection.best.model_from_scan, scan_, model_, background_, final_distance_, context_);
     detection.segment = std::move(segment.part);
     detection.margin_points = std::move(segment.margin);
   }
@@ -622,6 +627,12 @@ Result<Detection> Judge::verdict_on(std::span<const detect::Hypothesis> hypothes
     candidates.push_back(candidate);
   }
   return Verification(*material_, look).verdict_on(std::move(candidates), look, accept_anyway);
+}
+
+Segment part_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                const VerifyOptions& options, const detect::SampledScan& sampled, const Context& context) {
+  return segment_at(model_from_scan, scan, model, background_of(scan, model, options, context, &sampled),
+                    score_distance(scan, model, options), context);
 }
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
