@@ -77,6 +77,12 @@ double score_distance(const scan::Scan& scan, double spacing_mm, const model::Pr
   return options.paper_mode ? sensor : sensor + options.deviation_ratio * model.diameter;
 }
 
+// What counts as on the model where a pose puts it.
+double score_distance_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                         const VerifyOptions& options) {
+  return score_distance(scan, spacing_around(model_from_scan, model, scan, options), model, options);
+}
+
 // Floors, walls and tables larger than the part would lend their points to any flat face of it.
 std::vector<std::uint8_t> background_of(const scan::Scan& scan, const model::PreparedModel& model,
                                         const VerifyOptions& options, const Context& context,
@@ -140,6 +146,12 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, Look look, bool 
                    .is_precise = true,
                    .is_finest = true};
   return {coarse, middle, fine};
+}
+
+Segment segment_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                   const std::vector<std::uint8_t>& background, double score_distance_mm, const Context& context) {
+  const SegmentOptions segmentation{std::max(score_distance_mm, 0.0075 * model.diameter), 0.03 * model.diameter, 0.8};
+  return segment_part(model_from_scan, model, scan, background, segmentation, context);
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -368,9 +380,8 @@ class Judge::Verification {
   }
 
   void cut_out(Detection& detection) const {
-    const double band_mm = std::max(final_distance_at(detection.best.model_from_scan), 0.0075 * model_.diameter);
-    const SegmentOptions segmentation{band_mm, 0.03 * model_.diameter, 0.8};
-    Segment segment = segment_part(detection.best.model_from_scan, model_, scan_, background_, segmentation, context_);
+    const Pose& pose = detection.best.model_from_scan;
+    Segment segment = segment_at(pose, scan_, model_, background_, final_distance_at(pose), context_);
     detection.segment = std::move(segment.part);
     detection.margin_points = std::move(segment.margin);
   }
@@ -550,9 +561,8 @@ class Judge::Verification {
     return evidence;
   }
 
-  // What counts as on the model where a pose puts it.
   [[nodiscard]] double final_distance_at(const Pose& model_from_scan) const {
-    return score_distance(scan_, spacing_around(model_from_scan, model_, scan_, options_), model_, options_);
+    return score_distance_at(model_from_scan, scan_, model_, options_);
   }
 
   // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
@@ -647,6 +657,12 @@ Result<Detection> Judge::verdict_on(std::span<const detect::Hypothesis> hypothes
     candidates.push_back(candidate);
   }
   return Verification(*material_, look).verdict_on(std::move(candidates), look, accept_anyway);
+}
+
+Segment part_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                const VerifyOptions& options, const detect::SampledScan& sampled, const Context& context) {
+  return segment_at(model_from_scan, scan, model, background_of(scan, model, options, context, &sampled),
+                    score_distance_at(model_from_scan, scan, model, options), context);
 }
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,

@@ -11,6 +11,7 @@
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/scan/scan.h"
 #include "asbuilt/verify/detection.h"
+#include "asbuilt/verify/segment.h"
 
 namespace asbuilt::verify {
 
@@ -119,6 +120,12 @@ class Judge {
   class Verification;
   std::unique_ptr<const Material> material_;
 };
+
+/// The part's points at a pose that is known, and those around them: what a judge cuts out at the pose that it accepts.
+/// `sampled` is the scan, or a thinned copy of it, as detection looked at it; what lies on its large planes is not the
+/// part's.
+[[nodiscard]] Segment part_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                              const VerifyOptions& options, const detect::SampledScan& sampled, const Context& context);
 
 /// One question to a judge of its own.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,
