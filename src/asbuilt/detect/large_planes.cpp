@@ -98,39 +98,6 @@ SampledScan sampled_scan(const scan::Scan& scan, double spacing_mm, double diame
   return sampled;
 }
 
-namespace {
-
-// How the points of a plane scatter about it where they were measured, 1 sigma: far away, and on what is looked at
-// flatly, more than the scan at its middle.
-std::vector<float> scatter_about(const PointCloud& planes, std::span<const float> spacings_mm, const KdTree& tree,
-                                 const Context& context) {
-  constexpr float kMost = 0.1F;  // spacings
-  constexpr float kSameDirection = 0.995F;
-  std::vector<float> scatter(planes.size(), 0.0F);
-  parallel_for_blocks(context, planes.size(), 512, [&](std::size_t begin, std::size_t end) {
-    std::vector<KdTree::Neighbour> neighbours;
-    for (std::size_t i = begin; i < end; ++i) {
-      const float spacing = spacings_mm[i];
-      tree.within(planes.positions[i], kReach * spacing, neighbours);
-      float squares = 0.0F;
-      int count = 0;
-      for (const KdTree::Neighbour& neighbour : neighbours) {
-        const std::uint32_t j = neighbour.index;
-        const float height = planes.normals[i].dot(planes.positions[j] - planes.positions[i]);
-        if (j == i || std::abs(height) > kSamePlane * spacing) continue;
-        if (std::abs(planes.normals[i].dot(planes.normals[j])) < kSameDirection) continue;
-        squares += height * height;
-        ++count;
-      }
-      // Of the difference of two points.
-      if (count > 0) scatter[i] = std::min(std::sqrt(0.5F * squares / static_cast<float>(count)), kMost * spacing);
-    }
-  });
-  return scatter;
-}
-
-}  // namespace
-
 std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, const SampledScan& sampled,
                                                  const Context& context) {
   PointCloud planes;
@@ -144,7 +111,6 @@ std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, const S
   std::vector<std::uint8_t> marks(scan.cloud.size(), 0);
   if (planes.empty()) return marks;
   const KdTree tree(planes.positions);
-  const std::vector<float> scatter = scatter_about(planes, spacings_mm, tree, context);
   const float reach = 1.5F * *std::ranges::max_element(spacings_mm);
   const auto noise = static_cast<float>(scan.noise_sigma_mm);
   constexpr float kAgreeing = 0.9F, kBeside = 1.5F, kRoom = 0.02F;  // spacings the latter two
@@ -155,7 +121,7 @@ std::vector<std::uint8_t> points_on_large_planes(const scan::Scan& scan, const S
     if (nearest.squared_distance > kBeside * kBeside * spacing * spacing) return;
     const Eigen::Vector3f& normal = planes.normals[nearest.index];
     const Eigen::Vector3f offset = scan.cloud.positions[i] - planes.positions[nearest.index];
-    const float height = 4.0F * std::max(noise, scatter[nearest.index]) + kRoom * spacing;
+    const float height = 4.0F * noise + kRoom * spacing;
     marks[i] = std::abs(offset.dot(normal)) <= height && std::abs(normal.dot(scan.cloud.normals[i])) >= kAgreeing;
   });
   return marks;

@@ -73,9 +73,10 @@ class Judge {
     ++sum.samples;
     const Eigen::Vector3d point = scan_from_model_ * point_in_model.cast<double>();
     const Eigen::Vector3d normal = scan_from_model_.linear() * normal_in_model.cast<double>();
-    const Eigen::Vector3d towards =
-        scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
-    const KdTree::Neighbour measured = surface_at(point, normal, lateral_at(options_, normal.dot(towards)));
+    const bool is_known = scan_.scan.viewpoint.known();
+    const Eigen::Vector3d towards = is_known ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
+    const double incidence = is_known ? normal.dot(towards) : 0.0;
+    const KdTree::Neighbour measured = surface_at(point, normal, lateral_at(options_, incidence));
     const bool is_there = measured.found();
     sum.explained_anywhere += is_there ? 1 : 0;
     const std::optional<double> seen =
@@ -180,7 +181,9 @@ ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::ui
 double lateral_at(const EvidenceOptions& options, double cosine) {
   constexpr double kFlat = 0.6;  // cosine
   const double seen = std::abs(cosine);
-  return seen >= kFlat || seen == 0.0 ? options.lateral_mm : options.lateral_mm * kFlat / std::max(seen, kGrazing);
+  if (seen >= kFlat || seen == 0.0) return options.lateral_mm;
+  const double apart_mm = options.lateral_mm * kFlat / std::max(seen, kGrazing);
+  return std::max(options.lateral_mm, std::min(apart_mm, options.most_lateral_mm));
 }
 
 double spacing_at(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan) {

@@ -29,7 +29,7 @@ struct ScanEvidence {
   std::vector<std::uint8_t> background;  ///< one a point of the scan
   scan::Scan foreground;                 ///< the scan without them: points, normals, surface variation
   KdTree foreground_tree;
-  std::optional<scan::DepthImage> depth;  ///< of all points, if the viewpoint is known
+  std::optional<scan::DepthImage> depth;   ///< of all points, if the viewpoint is known
   std::optional<scan::FieldOfView> field;  ///< likewise
 };
 
@@ -80,10 +80,11 @@ struct EvidenceOptions {
   double distance_mm = 1.0;  ///< tau_theta: across the surface
   double lateral_mm = 1.0;   ///< how far along the surface the next measurement may be
   std::size_t most_samples = std::numeric_limits<std::size_t>::max();
+  double most_lateral_mm = std::numeric_limits<double>::infinity();  ///< where surfaces are looked at flatly
 };
 
 /// `lateral_mm` where the sensor looks on a surface at this cosine of the incidence, 0 where it is not known: beyond 53
-/// degrees, rays meet the surface ever farther apart.
+/// degrees, rays meet the surface ever farther apart; up to `most_lateral_mm`.
 [[nodiscard]] double lateral_at(const EvidenceOptions& options, double cosine);
 
 /// Asks the scan about every one of `samples` (oriented, in the model frame), or the first `most_samples` of them.

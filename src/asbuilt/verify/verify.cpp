@@ -349,7 +349,7 @@ class Judge::Verification {
     // What edges show is read as finely as this part fits, not as deviating parts may.
     const double edge_distance =
         std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance, final_distance);
-    const EvidenceOptions edge_options{edge_distance, lateral_at(candidate.model_from_scan, edge_distance)};
+    const EvidenceOptions edge_options = options_within(candidate.model_from_scan, edge_distance);
     const auto settled = [&](const Pose& pose) {
       return settled_between_edges(pose, evidence, model_, hold_needed(candidate.missing_share, options_), evidence_,
                                    edge_options);
@@ -553,9 +553,9 @@ class Judge::Verification {
 
   PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
                      double contradiction_weight) const {
-    const PoseEvidence evidence =
-        evidence_for(candidate.model_from_scan, samples, model_, evidence_,
-                     {distance_mm, lateral_at(candidate.model_from_scan, distance_mm), most_samples});
+    EvidenceOptions how = options_within(candidate.model_from_scan, distance_mm);
+    how.most_samples = most_samples;
+    const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_, how);
     take_evidence(candidate, evidence, model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
     return evidence;
@@ -573,7 +573,14 @@ class Judge::Verification {
 
   [[nodiscard]] EvidenceOptions evidence_options(const Pose& model_from_scan, double least_distance_mm = 0.0) const {
     const double distance_mm = std::max(least_distance_mm, final_distance_at(model_from_scan));
-    return {distance_mm, lateral_at(model_from_scan, distance_mm)};
+    return options_within(model_from_scan, distance_mm);
+  }
+
+  // Where surfaces are looked at flatly, room along them up to what it is at the scan's median spacing.
+  [[nodiscard]] EvidenceOptions options_within(const Pose& model_from_scan, double distance_mm) const {
+    EvidenceOptions options{distance_mm, lateral_at(model_from_scan, distance_mm)};
+    options.most_lateral_mm = std::max(2.5 * scan_.spacing_mm, distance_mm);
+    return options;
   }
 
   const scan::Scan& scan_;

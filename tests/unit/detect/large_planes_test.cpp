@@ -113,26 +113,6 @@ TEST(LargePlanes, GoOnWhereTheScanIsSparse) {
       << "with one spacing for all, nothing links the far end";
 }
 
-// One sigma for the scan says too little of what is far away.
-TEST(LargePlanes, TakeTheirNoisierPointsAlong) {
-  scan::Scan scan;
-  scan.noise_sigma_mm = 0.01;
-  scan.spacing_mm = 1.0;
-  PointCloud cloud;
-  add_rectangle(cloud, {0, 0, 0}, kX, kY, 60, 60, 0.08F);
-  // Something flat that stands a spacing above is not of the plane.
-  const std::size_t floor = cloud.size();
-  add_rectangle(cloud, {0, 0, 1}, kX, kY, 15, 15, 0.02F);
-  scan.cloud = cloud;
-  SampledScan sampled{cloud, even(cloud), {}};
-  sampled.on_large_plane.assign(cloud.size(), 0);
-  std::fill_n(sampled.on_large_plane.begin(), floor, std::uint8_t{1});
-  const auto marks = points_on_large_planes(scan, sampled, Context(2));
-  EXPECT_GE(marked(marks, 0, floor), floor * 98 / 100);
-  EXPECT_EQ(marked(marks, floor, cloud.size()), 0U);
-  EXPECT_EQ(points_on_large_planes(scan, sampled, Context(1)), marks);
-}
-
 TEST(LargePlanes, OfNothingAreNone) { EXPECT_TRUE(on_large_planes({}, {}, 30.0, Context(1)).empty()); }
 
 }  // namespace
