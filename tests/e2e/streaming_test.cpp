@@ -23,15 +23,28 @@ double rms_shift_mm(const Pose& a, const Pose& b, const TriangleMesh& part) {
   return std::sqrt(sum / static_cast<double>(part.vertices.size()));
 }
 
+// Three scans of a casing, one of them without it, written into a folder of their own.
+Result<simulate::Simulation> simulated_into(const fs::path& base, int points) {
+  fs::remove_all(base);
+  ASBUILT_TRY(
+      simulation,
+      simulate::simulate(test::casing(),
+                         {.scans = 3, .points = points, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2)));
+  ASBUILT_CHECK(simulate::write_simulation(base, simulation));
+  return std::move(simulation);
+}
+
+std::vector<std::string> scans_of(const simulate::Simulation& simulation, const fs::path& base) {
+  std::vector<std::string> scans;
+  for (const auto& scan : simulation.scans) scans.push_back((base / (scan.name + ".ply")).string());
+  return scans;
+}
+
 TEST(Streaming, AScanForcedThroughTheSieveGivesTheSameVerdictAndNearlyTheSamePose) {
   const fs::path base = fs::path(testing::TempDir()) / "asbuilt_streaming";
-  fs::remove_all(base);
-  const auto simulation = simulate::simulate(
-      test::casing(), {.scans = 3, .points = 120000, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2));
+  const auto simulation = simulated_into(base, 120000);
   ASSERT_TRUE(simulation) << simulation.error().message;
-  ASSERT_TRUE(simulate::write_simulation(base, *simulation));
-  std::vector<std::string> scans;
-  for (const auto& scan : simulation->scans) scans.push_back((base / (scan.name + ".ply")).string());
+  const std::vector<std::string> scans = scans_of(*simulation, base);
 
   const auto detected = [&](double memory_gb, const std::string& output, Context context) {
     pipeline::Options options;
@@ -67,13 +80,9 @@ TEST(Streaming, AScanForcedThroughTheSieveGivesTheSameVerdictAndNearlyTheSamePos
 
 TEST(Streaming, ADenseScanIsSearchedInFewerPointsAndThePartCutOutOfAll) {
   const fs::path base = fs::path(testing::TempDir()) / "asbuilt_dense";
-  fs::remove_all(base);
-  const auto simulation = simulate::simulate(
-      test::casing(), {.scans = 3, .points = 150000, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2));
+  const auto simulation = simulated_into(base, 150000);
   ASSERT_TRUE(simulation) << simulation.error().message;
-  ASSERT_TRUE(simulate::write_simulation(base, *simulation));
-  std::vector<std::string> scans;
-  for (const auto& scan : simulation->scans) scans.push_back((base / (scan.name + ".ply")).string());
+  const std::vector<std::string> scans = scans_of(*simulation, base);
 
   int closer_looks = 0;
   const auto detected = [&](double search_spacing_ratio, const std::string& output, int threads) {

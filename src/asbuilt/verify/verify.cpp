@@ -332,7 +332,8 @@ class Judge::Verification {
     register_at(final_distance, kFewIterations, most_points);
     const EvidenceOptions options = evidence_options(candidate.model_from_scan);
     const auto judged_densely = [&] {
-      return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance, kContradictionWeight);
+      return judge(candidate, model_.dense_samples, options_within(candidate.model_from_scan, final_distance),
+                   kContradictionWeight);
     };
     PoseEvidence evidence = judged_densely();
     const auto is_plausible = [&] {
@@ -514,9 +515,9 @@ class Judge::Verification {
           lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, only_facing()})
               .model_from_scan;
     }
-    judge(candidate, *level.model_samples, level.most_samples,
-          std::max(level.least_score_distance_mm, final_distance_at(candidate.model_from_scan)),
-          level.contradiction_weight);
+    EvidenceOptions how = evidence_options(candidate.model_from_scan, level.least_score_distance_mm);
+    how.most_samples = level.most_samples;
+    judge(candidate, *level.model_samples, how, level.contradiction_weight);
   }
 
   // Walls turned away from the sensor hold no points; a sheet has no such side.
@@ -551,10 +552,8 @@ class Judge::Verification {
         flat_normal_agreement(pose, around, evidence_, model_, options).value_or(options_.min_normal_agreement);
   }
 
-  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
+  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, const EvidenceOptions& how,
                      double contradiction_weight) const {
-    EvidenceOptions how = options_within(candidate.model_from_scan, distance_mm);
-    how.most_samples = most_samples;
     const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_, how);
     take_evidence(candidate, evidence, model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
@@ -565,21 +564,19 @@ class Judge::Verification {
     return score_distance_at(model_from_scan, scan_, model_, options_);
   }
 
-  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
-  [[nodiscard]] double lateral_at(const Pose& model_from_scan, double distance_mm) const {
-    if (options_.paper_mode) return 0.0;
-    return std::max(2.5 * spacing_around(model_from_scan, model_, scan_, options_), distance_mm);
-  }
-
   [[nodiscard]] EvidenceOptions evidence_options(const Pose& model_from_scan, double least_distance_mm = 0.0) const {
-    const double distance_mm = std::max(least_distance_mm, final_distance_at(model_from_scan));
-    return options_within(model_from_scan, distance_mm);
+    return options_within(model_from_scan, std::max(least_distance_mm, final_distance_at(model_from_scan)));
   }
 
-  // Where surfaces are looked at flatly, room along them up to what it is at the scan's median spacing.
+  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours. Where surfaces are
+  // looked at flatly, there is room up to what it is at the scan's median spacing.
   [[nodiscard]] EvidenceOptions options_within(const Pose& model_from_scan, double distance_mm) const {
-    EvidenceOptions options{distance_mm, lateral_at(model_from_scan, distance_mm)};
-    options.most_lateral_mm = std::max(2.5 * scan_.spacing_mm, distance_mm);
+    constexpr double kRoomInSpacings = 2.5;
+    EvidenceOptions options{distance_mm, 0.0};
+    if (options_.paper_mode) return options;
+    const double spacing_mm = spacing_around(model_from_scan, model_, scan_, options_);
+    options.lateral_mm = std::max(kRoomInSpacings * spacing_mm, distance_mm);
+    options.most_lateral_mm = std::max(kRoomInSpacings * scan_.spacing_mm, distance_mm);
     return options;
   }
 
