@@ -5,11 +5,16 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <numbers>
 #include <optional>
+#include <sstream>
 
+#include "asbuilt/core/pose.h"
+#include "asbuilt/evaluate/truth.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/json_text.h"
 #include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/number.h"
 #include "asbuilt/io/run_record.h"
 #include "asbuilt/io/scan_file.h"
 #include "asbuilt/model/prepared_file.h"
@@ -38,6 +43,7 @@ struct ScanInfo {
 
 struct FileInfo {
   std::string path, kind, format, unit = "mm";
+  bool unit_is_known = true;  ///< stated by the file or by the user; else mm was taken
   std::size_t points = 0, triangles = 0;
   Eigen::AlignedBox3d box;
   std::vector<ScanInfo> scans;
@@ -61,11 +67,13 @@ void add_scan(FileInfo& info, const io::ScanFile& file, const Context& context) 
                         file.cloud.has_normals(), file.grid, !file.colours.empty(), !file.intensities.empty()});
   info.unit = io::name_of(file.unit);
   info.notes.insert(info.notes.end(), file.notes.begin(), file.notes.end());
-  const std::size_t removed = file.cloud.size() - sane.cloud.size();
+  // STL repeats a corner in each of its triangles: there that is no flaw.
+  const std::size_t duplicates = file.format.starts_with("stl") ? 0 : sane.report.duplicates;
+  const std::size_t removed = sane.report.not_finite + sane.report.no_return + duplicates;
   if (removed > 0) {
     info.notes.push_back(fmt::format("{}: {} unusable point{} ({} not finite, {} without return, {} duplicates)",
                                      file.name, removed, removed == 1 ? "" : "s", sane.report.not_finite,
-                                     sane.report.no_return, sane.report.duplicates));
+                                     sane.report.no_return, duplicates));
   }
 }
 
@@ -102,6 +110,67 @@ Result<void> describe_prepared(FileInfo& info, const Context& context) {
   return {};
 }
 
+/// The numbers of a small text file that holds nothing else.
+std::optional<std::vector<double>> only_numbers(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kMostBytes = 2000;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored) || std::filesystem::file_size(path, ignored) > kMostBytes) {
+    return std::nullopt;
+  }
+  const auto text = io::read_file(path);
+  if (!text) return std::nullopt;
+  std::istringstream words(*text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    const auto number = io::parse_number(word);
+    if (!number) return std::nullopt;
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+/// Matrices lie beside scans and would pass for three or four points: a pose is 4 x 4, a camera 3 x 3.
+bool describe_matrix(FileInfo& info) {
+  const auto n = only_numbers(info.path);
+  if (!n) return false;
+  const auto is_row = [&](std::size_t at, std::initializer_list<double> row) {
+    return std::equal(row.begin(), row.end(), n->begin() + static_cast<std::ptrdiff_t>(at));
+  };
+  if (n->size() == 16 && is_row(12, {0, 0, 0, 1})) {
+    const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n->data());
+    constexpr double kFewDigits = 1e-3;
+    const bool is_motion = is_rigid(matrix, kFewDigits);
+    info.kind = "pose";
+    info.format = is_motion ? "4 x 4 matrix" : "4 x 4 matrix that is no rigid motion";
+    if (!is_motion) return true;
+    const Eigen::Vector3d shift = matrix.topRightCorner<3, 1>();
+    info.notes.push_back(fmt::format(
+        "It turns by {:.4g} degrees and then shifts by {:.6g}, {:.6g}, {:.6g}; which way it "
+        "leads the file does not say. --poses takes model_from_scan, as CSV or JSON.",
+        rotation_angle(matrix.topLeftCorner<3, 3>()) * 180.0 / std::numbers::pi, shift.x(), shift.y(), shift.z()));
+  } else if (n->size() == 9 && is_row(6, {0, 0, 1}) && (*n)[1] == 0.0 && (*n)[3] == 0.0 && (*n)[0] > 0.0) {
+    info.kind = "camera";
+    info.format = "3 x 3 matrix";
+    info.notes.push_back(
+        fmt::format("fx {:g}, fy {:g}, cx {:g}, cy {:g} in pixels; --camera takes it for depth images.", (*n)[0],
+                    (*n)[4], (*n)[2], (*n)[5]));
+  } else {
+    return false;
+  }
+  return true;
+}
+
+Result<void> describe_truth(FileInfo& info) {
+  ASBUILT_TRY(truth, evaluate::read_truth(info.path));
+  info.kind = "truth";
+  info.format = "truth of simulated scans, schema 1";
+  const auto shows_it = [](const evaluate::TrueScan& scan) { return scan.model_from_scan.has_value(); };
+  info.notes.push_back(
+      fmt::format("{} scans, of which {} show the part; noise {:.4g} mm (1 sigma); `asbuilt evaluate` reads it",
+                  truth.scans.size(), std::ranges::count_if(truth.scans, shows_it), truth.noise_sigma_mm));
+  return {};
+}
+
 void describe_model(FileInfo& info, const io::ModelFile& model) {
   info.kind = model.is_cad ? "cad" : "mesh";
   info.format = model.format;
@@ -116,11 +185,28 @@ void describe_model(FileInfo& info, const io::ModelFile& model) {
                                    model.cad_parts == 1 ? "one body" : fmt::format("{} bodies", model.cad_parts)));
 }
 
+/// A hint where the size that follows from taking mm is that of nothing that is scanned.
+void look_at_unit(FileInfo& info, const Arguments& arguments) {
+  constexpr double kSmallest_mm = 10.0;
+  const bool states_it = info.kind == "cad" || info.format.starts_with("e57");
+  info.unit_is_known = states_it || arguments.reading.unit != io::Unit::stated;
+  const bool says_so_already = info.format.starts_with("las") || info.format.starts_with("ptx");
+  if (info.unit_is_known || says_so_already || info.box.isEmpty()) return;
+  const double diagonal_mm = info.box.sizes().norm();
+  if (diagonal_mm >= kSmallest_mm || diagonal_mm == 0.0) return;
+  info.notes.push_back(
+      fmt::format("The file states no unit. In mm all of it is {:.3g} mm across; were it in metres, {:.3g} m: "
+                  "then say --unit m of a model and --scan-unit m of a scan.",
+                  diagonal_mm, diagonal_mm));
+}
+
 Result<void> describe(FileInfo& info, const Arguments& arguments, const Context& context) {
   const std::filesystem::path path(info.path);
   if (std::filesystem::is_directory(path)) return describe_result(info, path / "result.json");
   if (path.filename() == "result.json") return describe_result(info, path);
+  if (path.filename() == "truth.json") return describe_truth(info);
   if (model::is_prepared_file(path)) return describe_prepared(info, context);
+  if (describe_matrix(info)) return {};
 
   // A file may be both: structured-light software exports scans as meshes.
   const auto model = io::read_model(path, arguments.reading.unit);
@@ -132,6 +218,7 @@ Result<void> describe(FileInfo& info, const Arguments& arguments, const Context&
   for (const io::ScanFile& file : *scans) add_scan(info, file, context);
   if (!model) info.kind = "scan";
   info.format = scans->front().format;
+  look_at_unit(info, arguments);
   return {};
 }
 
@@ -169,10 +256,19 @@ std::string printable(std::string text) {
 
 std::string lines_of(const FileInfo& info) {
   if (!info.error.empty()) return {};  // told on standard error
+  const bool holds_surface = info.kind != "pose" && info.kind != "camera" && info.kind != "truth";
+  if (!holds_surface) {
+    std::string text = fmt::format("{}\n  {}, {}\n", info.path, info.kind, info.format);
+    for (const std::string& note : info.notes) text += fmt::format("  note: {}\n", note);
+    return text;
+  }
   const Eigen::Vector3d extent = info.box.isEmpty() ? Eigen::Vector3d::Zero().eval() : info.box.sizes().eval();
-  std::string text =
-      fmt::format("{}\n  {}, {}, unit {}\n  {} points, {} triangles, extent {:.6g} x {:.6g} x {:.6g} mm\n", info.path,
-                  info.kind, info.format, info.unit, info.points, info.triangles, extent.x(), extent.y(), extent.z());
+  std::string text = fmt::format("{}\n  {}, {}, unit {}{}\n  ", info.path, info.kind, info.format, info.unit,
+                                 info.unit_is_known ? "" : " (not stated)");
+  if (info.points > 0 || info.triangles == 0) text += fmt::format("{} points, ", info.points);
+  if (info.triangles > 0) text += fmt::format("{} triangles, ", info.triangles);
+  text += info.box.isEmpty() ? "no extent\n"
+                             : fmt::format("extent {:.6g} x {:.6g} x {:.6g} mm\n", extent.x(), extent.y(), extent.z());
   for (const ScanInfo& scan : info.scans) {
     const std::string viewpoint = scan.viewpoint ? fmt::format("{:.4g}, {:.4g}, {:.4g}", scan.viewpoint->x(),
                                                                scan.viewpoint->y(), scan.viewpoint->z())

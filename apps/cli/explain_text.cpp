@@ -9,6 +9,8 @@
 #include <numbers>
 #include <optional>
 
+#include "asbuilt/verify/verdict.h"
+
 namespace asbuilt::cli {
 namespace {
 
@@ -89,8 +91,7 @@ std::string surface_sentences(const io::RunRecord& record, const io::CandidateRe
          fmt::format(
              "  Against it: {:.0f} % is denied{}, of which {:.0f} % was seen through, as the sensor measured something "
              "behind it{}, and {:.0f} % has its surface in another place. From {:.0f} % nothing came back, which "
-             "counts "
-             "half.\n",
+             "counts a quarter.\n",
              100.0 * best.contradiction_share, percent_allowed(record, "max_contradiction_share"),
              100.0 * best.free_space_violations, percent_allowed(record, "max_free_space_share"), 100.0 * elsewhere,
              100.0 * best.missing_share);
@@ -105,13 +106,17 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
   if (std::isnan(best.residual_ratio)) return text + ".\n";
   text += fmt::format(", {:.2f} of the distance that counts as on it{}; 0.58 would be no fit at all.\n",
                       best.residual_ratio, limit(record, "max_residual_ratio", "allowed:", 1.0, ""));
+  const auto least = option_of(record, "min_weakest_direction");
+  verify::VerifyOptions limits;
+  limits.min_weakest_direction = least.value_or(0.0);
+  limits.missing_hold_surcharge = option_of(record, "missing_hold_surcharge").value_or(0.0);
+  const double needed = verify::hold_needed(std::isnan(best.missing_share) ? 0.0 : best.missing_share, limits);
   text += fmt::format(
       "  Hold: {:.4f}{} in the direction in which the surface that was found lets the part slide or turn most easily; "
       "0 would be free",
-      best.weakest_direction, limit(record, "min_weakest_direction", "needed:", 1.0, ""));
-  const auto firm = option_of(record, "min_weakest_direction");
+      best.weakest_direction, least ? fmt::format(" (needed: {:.4g})", needed) : "");
   // Edges are asked only where the surface alone is loose.
-  if (!std::isnan(best.slip_lead) && firm && best.weakest_direction < *firm) {
+  if (!std::isnan(best.slip_lead) && least && best.weakest_direction < needed) {
     text += fmt::format("; its edges: {:.0f} measurements more than for the slip that comes closest", best.slip_lead);
   }
   text += ".\n";

@@ -15,7 +15,6 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "asbuilt/live/state.h"
 #include "asbuilt/web/pages.h"
 #include "request_check.h"
 
@@ -77,17 +76,16 @@ class Upload {
 }  // namespace
 
 struct Server::Implementation {
-  Implementation(const live::LiveSession& shown, fs::path folder, ServerOptions chosen, Requests what)
-      : session(shown), watched(std::move(folder)), options(std::move(chosen)), requests(std::move(what)) {}
+  Implementation(Content shown, fs::path folder, ServerOptions chosen, Requests what)
+      : content(std::move(shown)), watched(std::move(folder)), options(std::move(chosen)), requests(std::move(what)) {}
 
-  const live::LiveSession& session;
+  Content content;
   fs::path watched;
   ServerOptions options;
   Requests requests;
   AccessRules rules;
   httplib::Server http;
   std::thread thread;
-  std::string surface;  // constant
   std::mutex mutex;
   std::condition_variable changed;
   std::uint64_t ticks = 0;
@@ -130,12 +128,13 @@ struct Server::Implementation {
       }
     });
     http.Get("/state", [this](const httplib::Request&, httplib::Response& response) {
-      response.set_content(to_json(*session.state()), kJson);
+      response.set_content(content.state().second, kJson);
     });
-    http.Get("/surface",
-             [this](const httplib::Request&, httplib::Response& response) { response.set_content(surface, kJson); });
+    http.Get("/surface", [this](const httplib::Request&, httplib::Response& response) {
+      response.set_content(content.surface, kJson);
+    });
     http.Get("/surface/values", [this](const httplib::Request&, httplib::Response& response) {
-      response.set_content(to_json(*session.values()), kJson);
+      response.set_content(content.values(), kJson);
     });
     http.Get("/events", [this](const httplib::Request&, httplib::Response& response) { listen(response); });
   }
@@ -150,24 +149,23 @@ struct Server::Implementation {
     response.set_chunked_content_provider(
         "text/event-stream",
         [this, sent](std::size_t, httplib::DataSink& sink) {
-          auto state = session.state();
-          if (state->revision == *sent) {
+          if (content.revision() == *sent) {
             std::unique_lock lock(mutex);
             const std::uint64_t before = ticks;
-            if (!stopping && session.state()->revision == *sent) {
+            if (!stopping && content.revision() == *sent) {
               changed.wait_for(lock, std::chrono::seconds(10), [&] { return stopping || ticks != before; });
             }
             if (stopping) {
               sink.done();
               return false;
             }
-            lock.unlock();
-            state = session.state();
           }
-          const std::string text = state->revision == *sent ? std::string(": still here\n\n")
-                                                            : fmt::format("event: state\nid: {}\ndata: {}\n\n",
-                                                                          state->revision, to_json(*state));
-          *sent = state->revision;
+          std::string text = ": still here\n\n";
+          if (content.revision() != *sent) {
+            const auto [revision, state] = content.state();
+            text = fmt::format("event: state\nid: {}\ndata: {}\n\n", revision, state);
+            *sent = revision;
+          }
           return sink.write(text.data(), text.size());
         },
         [this](bool) { --listeners; });
@@ -175,7 +173,7 @@ struct Server::Implementation {
 
   void add_actions() {
     http.Post("/scans", [this](const httplib::Request& request, httplib::Response& response,
-                               const httplib::ContentReader& content) { take_upload(request, response, content); });
+                               const httplib::ContentReader& body) { take_upload(request, response, body); });
     http.Post(R"(/scans/([^/]+)/restore)", [this](const httplib::Request& request, httplib::Response& response) {
       act_on_file(request.matches[1], response, requests.restore);
     });
@@ -197,8 +195,7 @@ struct Server::Implementation {
     response.set_content(nlohmann::json{{"file", file}}.dump(), kJson);
   }
 
-  void take_upload(const httplib::Request& request, httplib::Response& response,
-                   const httplib::ContentReader& content) {
+  void take_upload(const httplib::Request& request, httplib::Response& response, const httplib::ContentReader& body) {
     const auto refuse = [&](int status, const std::string& reason) { answer(response, status, reason); };
     if (request.get_param_value_count("name") != 1) return refuse(400, "give the file's name as ?name=...");
     const std::string file = request.get_param_value("name");
@@ -208,7 +205,7 @@ struct Server::Implementation {
       return refuse(400, "the request has no length");
     }
     Upload upload(watched, file);
-    const bool whole = content([&](const char* data, std::size_t size) {
+    const bool whole = body([&](const char* data, std::size_t size) {
       return upload.bytes() + size <= options.largest_upload && upload.append(data, size);
     });
     if (upload.has_failed()) {
@@ -227,13 +224,12 @@ struct Server::Implementation {
 
 Server::Server(std::unique_ptr<Implementation> implementation) : implementation_(std::move(implementation)) {}
 
-Result<std::unique_ptr<Server>> Server::start(const live::LiveSession& session, const fs::path& watched,
-                                              const ServerOptions& options, Requests requests) {
-  auto own = std::make_unique<Implementation>(session, watched, options, std::move(requests));
+Result<std::unique_ptr<Server>> Server::start(Content content, const fs::path& watched, const ServerOptions& options,
+                                              Requests requests) {
+  auto own = std::make_unique<Implementation>(std::move(content), watched, options, std::move(requests));
   own->rules.on_loopback = is_loopback(options.host);
   own->rules.token = options.token;
   if (!own->rules.on_loopback && own->rules.token.empty()) own->rules.token = random_token();
-  own->surface = to_json(session.surface());
   own->guard();
   own->add_pages();
   own->add_actions();

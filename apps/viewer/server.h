@@ -6,9 +6,9 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "asbuilt/core/result.h"
-#include "asbuilt/live/session.h"
 
 namespace asbuilt::viewer {
 
@@ -19,6 +19,14 @@ struct ServerOptions {
   std::uint64_t largest_upload = 4ULL << 30U;
 };
 
+/// What is served, as JSON of docs/live-protocol.md. Asked by threads of the server.
+struct Content {
+  std::function<std::uint64_t()> revision;                       ///< of the present state
+  std::function<std::pair<std::uint64_t, std::string>()> state;  ///< with its revision
+  std::function<std::string()> values;
+  std::string surface;  ///< constant
+};
+
 /// What a request asks of the session; called by threads of the server, must return at once.
 struct Requests {
   std::function<bool(const std::string& file)> take_out;  ///< false: no such file
@@ -26,13 +34,12 @@ struct Requests {
   std::function<void()> write_result;
 };
 
-/// The protocol of docs/live-protocol.md over a session. Reads the session's state, writes uploads into the watched
-/// folder (whole or not at all), and hands everything else on.
+/// The protocol of docs/live-protocol.md. Writes uploads into the watched folder (whole or not at all), and hands
+/// everything else on.
 class Server {
  public:
   /// Errors: unwritable_output (the port is taken, or no such address), with nothing left running.
-  [[nodiscard]] static Result<std::unique_ptr<Server>> start(const live::LiveSession& session,
-                                                             const std::filesystem::path& watched,
+  [[nodiscard]] static Result<std::unique_ptr<Server>> start(Content content, const std::filesystem::path& watched,
                                                              const ServerOptions& options, Requests requests);
   ~Server();
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "asbuilt/live/folder_watch.h"
+#include "asbuilt/live/state.h"
 
 namespace asbuilt::viewer {
 namespace {
@@ -68,7 +69,7 @@ class Loop {
 
   Result<void> run(const WatchReports& reports) {
     ASBUILT_TRY(watch, live::FolderWatch::open(options_.watch, options_.settle));
-    ASBUILT_TRY(server, Server::start(session_, options_.watch, options_.server,
+    ASBUILT_TRY(server, Server::start(content_of(session_), options_.watch, options_.server,
                                       {[this](const std::string& file) { return take_out(file); },
                                        [this](const std::string& file) { return restore(file); },
                                        [this] { inbox_.put([this] { write_result(); }); }}));
@@ -195,6 +196,15 @@ class Loop {
 };
 
 }  // namespace
+
+Content content_of(const live::LiveSession& session) {
+  return {[&session] { return session.state()->revision; },
+          [&session] {
+            const auto state = session.state();
+            return std::pair(state->revision, live::to_json(*state));
+          },
+          [&session] { return live::to_json(*session.values()); }, live::to_json(session.surface())};
+}
 
 Result<void> run_watch(live::LiveSession& session, const WatchOptions& options, const WatchReports& reports,
                        std::stop_token stop) {

@@ -26,6 +26,9 @@ struct WatchReports {
   std::function<void(const live::LiveState&)> state;
 };
 
+/// What a server shows of a session, which has to outlive it.
+[[nodiscard]] Content content_of(const live::LiveSession& session);
+
 /// Serves a session over a watched folder until `stop`; then writes nothing more: the session lies on disk.
 /// Errors: unreadable_input (no such folder), unwritable_output (the port is taken).
 [[nodiscard]] Result<void> run_watch(live::LiveSession& session, const WatchOptions& options,

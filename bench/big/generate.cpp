@@ -65,11 +65,12 @@ int main(int argc, char** argv) {
   double lowest = 1e30;
   for (const Eigen::Vector3d& vertex : part.vertices) lowest = std::min(lowest, vertex.z());
   const Pose scene_from_model = placed(30, -20, -lowest, 0.7);
+  // Boxes and cylinders are centred: these stand on the floor, whose upper side is at 0.
   const std::vector<TriangleMesh> scene{moved(part, scene_from_model),
-                                        moved(simulate::box({12000, 12000, 10}), placed(-6000, -6000, -10, 0)),
-                                        moved(simulate::box({150, 90, 200}), placed(260, 120, 0, 0.4)),
-                                        moved(simulate::box({80, 220, 60}), placed(-330, 60, 0, -0.3)),
-                                        moved(simulate::cylinder(60, 180), placed(60, 330, 0, 0))};
+                                        moved(simulate::box({12000, 12000, 10}), placed(0, 0, -5, 0)),
+                                        moved(simulate::box({150, 90, 200}), placed(260, 120, 100, 0.4)),
+                                        moved(simulate::box({80, 220, 60}), placed(-330, 60, 30, -0.3)),
+                                        moved(simulate::cylinder(60, 180), placed(60, 330, 90, 0))};
   const model::RayScene rays{std::span<const TriangleMesh>(scene)};
   const Pose from_scan = scene_from_scan({-500, -800, 700}, {0, 0, 60});
   const Context context;

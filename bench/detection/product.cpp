@@ -6,6 +6,7 @@
 
 #include "asbuilt/pipeline/find_part.h"
 #include "asbuilt/pipeline/scan_hints.h"
+#include "asbuilt/pipeline/search_points.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/scan/scan.h"
 #include "asbuilt/verify/verify.h"
@@ -65,7 +66,13 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
   Result<scan::Scan> scan;
   {
     const Timed timed(record.prepare_scan);
-    scan = scan::prepare_scan(scan_of_case.points_in_scan, std::nullopt, viewpoints.of("", ""), options.scan, context);
+    PointCloud thin;
+    const PointCloud& all = scan_of_case.points_in_scan;
+    const auto staying = pipeline::search_points(all.positions, prepared.model, options.detect, context);
+    if (staying) {
+      for (const std::uint32_t i : *staying) thin.positions.push_back(all.positions[i]);
+    }
+    scan = scan::prepare_scan(staying ? thin : all, std::nullopt, viewpoints.of("", ""), options.scan, context);
   }
   if (!scan) return note_failure(record, "unreadable", scan.error().message), Result<void>{};
   if (const auto contradiction = pipeline::size_contradiction(*scan, prepared.model, options)) {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -22,12 +21,6 @@ using Json = nlohmann::ordered_json;
 
 // How near a hypothesis must be for the registration to have a fair chance.
 constexpr double kNearAngleDeg = 12.0, kNearShare = 0.1;
-
-double processor_seconds() {
-  std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 // Every field once, for both directions.
 template <class Record, class Visitor>
@@ -114,10 +107,10 @@ void take(const Json& json, Judged& judged) {
 
 }  // namespace
 
-Timed::Timed(StepTime& time) : time_(time), cpu_begin_(processor_seconds()), begin_(std::chrono::steady_clock::now()) {}
+Timed::Timed(StepTime& time) : time_(time) {}
 Timed::~Timed() {
-  time_.cpu += processor_seconds() - cpu_begin_;
-  time_.wall += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  time_.cpu += watch_.cpu_seconds();
+  time_.wall += watch_.seconds();
 }
 
 Judged judged(const Pose& model_from_scan, const std::optional<Pose>& true_model_from_scan, const SuitePart& part) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -9,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../stopwatch.h"
 #include "asbuilt/core/pose.h"
 #include "asbuilt/core/result.h"
 #include "cases.h"
@@ -31,8 +31,7 @@ class Timed {
 
  private:
   StepTime& time_;
-  double cpu_begin_;
-  std::chrono::steady_clock::time_point begin_;
+  Stopwatch watch_;
 };
 
 /// A pose against the truth. Without the part there is no displacement, and no pose is right.

@@ -9,8 +9,7 @@
 #include <open3d/pipelines/registration/RobustKernel.h>
 #include <open3d/pipelines/registration/TransformationEstimation.h>
 
-#include <chrono>
-
+#include "../stopwatch.h"
 #include "peer.h"
 
 namespace asbuilt::bench {
@@ -58,10 +57,6 @@ std::vector<Pose> open3d_poses(const RefinementScene& scene, const std::vector<r
   return poses;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
 }  // namespace
 
 Result<std::vector<Trial>> peer_trials(const RefinementScene& scene, int seeds, const Context& context) {
@@ -70,12 +65,12 @@ Result<std::vector<Trial>> peer_trials(const RefinementScene& scene, int seeds, 
   for (int seed = 0; seed < seeds; ++seed) {
     const auto views = perturbed(scene, 3.0, 0.03, static_cast<std::uint64_t>(seed));
     ASBUILT_TRY(links, product_links(scene, views, context));
-    auto begin = std::chrono::steady_clock::now();
+    const Stopwatch their_watch;
     const std::vector<Pose> theirs = open3d_poses(scene, views, links);
-    const double their_seconds = seconds_since(begin);
-    begin = std::chrono::steady_clock::now();
+    const double their_seconds = their_watch.seconds();
+    const Stopwatch our_watch;
     ASBUILT_TRY(ours, refine::refine(views, links, {}, context));
-    const double our_seconds = seconds_since(begin);
+    const double our_seconds = our_watch.seconds();
     Trial trial{"peer", scene.name, "Open3D multiway", static_cast<std::uint64_t>(seed), {}, {}};
     trial.figures["links"] = static_cast<double>(links.size());
     trial.figures["seconds"] = their_seconds;

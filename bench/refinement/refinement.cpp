@@ -119,8 +119,8 @@ Result<void> run_one(const Arguments& args) {
     const Accuracy accuracy = judge.judge(run.poses, context, run.members);
     fmt::print("{}: {} links, {} dropped, {} of {} together, {:.3f} sigma, ratio {:.4f}, {} iterations{}, {:.2f} s\n",
                scene.name, run.links, run.dropped.size(), run.members.size(), scene.views.size(),
-               accuracy.relative_pose_error_sigma, accuracy.ratio_to_oracle(), run.iterations,
-               run.converged ? "" : " (not converged)", run.seconds);
+               accuracy.relative_pose_error_sigma, accuracy.ratio_to_oracle(), run.refinement.iterations,
+               run.refinement.converged ? "" : " (not converged)", run.seconds);
     for (std::size_t i = 0; i < run.members.size(); ++i) {
       const std::vector<int> pair{run.members[static_cast<std::size_t>(run.refinement.fixed_view)], run.members[i]};
       if (run.refinement.view_holds.empty() || pair[0] == pair[1]) continue;

@@ -4,13 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 #include <numbers>
 #include <numeric>
 #include <utility>
 
+#include "../stopwatch.h"
 #include "asbuilt/core/random.h"
 #include "asbuilt/graph/pose_graph.h"
 #include "asbuilt/refine/gauge.h"
@@ -20,20 +19,6 @@
 
 namespace asbuilt::bench {
 namespace {
-
-class Stopwatch {
- public:
-  [[nodiscard]] double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-  [[nodiscard]] double cpu_seconds() const {
-    return static_cast<double>(std::clock() - cpu_begin_) / static_cast<double>(CLOCKS_PER_SEC);
-  }
-
- private:
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  std::clock_t cpu_begin_ = std::clock();
-};
 
 std::vector<refine::View> chosen(const std::vector<refine::View>& views, const std::vector<int>& members) {
   std::vector<refine::View> result;
@@ -78,8 +63,8 @@ Trial trial_of(const char* kind, const RefinementScene& scene, std::string varia
   trial.figures["views"] = static_cast<double>(scene.views.size());
   trial.figures["points"] = static_cast<double>(scene.points());
   trial.figures["links"] = static_cast<double>(run.links);
-  trial.figures["iterations"] = run.iterations;
-  trial.figures["converged"] = run.converged ? 1.0 : 0.0;
+  trial.figures["iterations"] = run.refinement.iterations;
+  trial.figures["converged"] = run.refinement.converged ? 1.0 : 0.0;
   trial.figures["seconds"] = run.seconds;
   trial.figures["cpu_seconds"] = run.cpu_seconds;
   trial.figures["dropped"] = static_cast<double>(run.dropped.size());
@@ -145,8 +130,6 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     }
     const bool settled = run.links == links.size() && round > 1;
     run.links = links.size();
-    run.iterations = refinement.iterations;
-    run.converged = refinement.converged;
     run.refinement = refinement;
     run.seconds = watch.seconds();
     run.cpu_seconds = watch.cpu_seconds();

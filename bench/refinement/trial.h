@@ -27,11 +27,9 @@ struct JointRun {
   std::vector<int> members;  ///< views that were refined together: the largest component
   std::vector<int> dropped;
   std::size_t links = 0;
-  int iterations = 0;
-  bool converged = false;
   refine::Refinement refinement;  ///< the last one, of the members
-  double seconds = 0.0;      ///< graph and refinement, trees and normals included
-  double cpu_seconds = 0.0;  ///< the same, processor time of all threads
+  double seconds = 0.0;           ///< graph and refinement, trees and normals included
+  double cpu_seconds = 0.0;       ///< the same, processor time of all threads
 };
 
 /// Graph, refinement, and once more without a view that the others contradict, as `asbuilt register` does it.

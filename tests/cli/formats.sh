@@ -21,6 +21,26 @@ grep -q '"has_intensities": true' stdout || fail "--columns was not followed"
 printf 'LASF' >short.las
 expect 3 info short.las
 says short.las truncated
+# A size that nothing has is told, and how to say the unit; what states its unit, or is said, is not doubted.
+printf '0 0 1\n0.2 0 1\n0 0.1 1\n' >metres.xyz
+expect 0 info metres.xyz
+grep -q 'unit mm (not stated)' stdout || fail "nothing says that the unit was guessed"
+grep -q 'scan-unit m ' stdout || fail "a scan of 0.2 mm is not doubted"
+expect 0 info metres.xyz --unit m
+! grep -q 'not stated)\|scan-unit' stdout || fail "a unit that was said is doubted"
+# Matrices that lie beside scans are no scans of three or four points.
+printf '0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1\n' >pose.txt
+expect 0 info pose.txt
+grep -q 'pose, 4 x 4 matrix' stdout || fail "a pose is not told"
+grep -q 'turns by 90 degrees and then shifts by 5, 6, 7' stdout || fail "a pose is told wrongly"
+printf '0 -2 0 5\n2 0 0 6\n0 0 2 7\n0 0 0 1\n' >scaled.xf
+expect 0 info scaled.xf
+grep -q 'no rigid motion' stdout || fail "a matrix with a scale is taken for a motion"
+printf '500 0 320\n0 510 240\n0 0 1\n' >intrinsic.txt
+expect 0 info intrinsic.txt
+grep -q 'fx 500, fy 510, cx 320, cy 240' stdout || fail "a camera is not told"
+printf '1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 2\n' >points.txt
+one points.txt 3 1  # the fourth lies at the origin, as a no-return does
 
 # ---- files of other software, where they are
 if [ -d "$data/formats" ]; then
@@ -32,6 +52,10 @@ if [ -d "$data/formats" ]; then
   one "$data/formats/no-points.las" 0 1
   expect 3 info "$data/formats/bad-crc.e57"
   says 'page 0 is damaged'
+  expect 0 info "$data/pcl_milk/milk.pcd"
+  grep -q 'scan-unit m ' stdout || fail "a carton of 0.3 mm is not doubted"
+  expect 0 info "$data/sim/clamp_absent/truth.json"
+  grep -q '10 scans, of which 5 show the part' stdout || fail "truth.json is not told"
 fi
 if [ -d "$data/cad" ]; then
   if "$asbuilt" info "$data/cad/frame.step" --json >stdout 2>stderr; then

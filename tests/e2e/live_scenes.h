@@ -29,9 +29,9 @@ class LiveScenes : public testing::Test {
   }
   ~LiveScenes() override { fs::remove_all(base_); }
 
-  void simulate_scenes(int scans, std::uint64_t seed, double absent_share = 0.0) {
+  void simulate_scenes(int scans, std::uint64_t seed, double absent_share = 0.0, int points = 20000) {
     simulate::SimulateOptions options{.scans = scans,
-                                      .points = 20000,
+                                      .points = points,
                                       .seed = seed,
                                       .clutter_objects = 3,
                                       .clutter_high = 0.7,
@@ -56,13 +56,13 @@ class LiveScenes : public testing::Test {
   }
 
   /// What `asbuilt reconstruct` makes of the files that are now watched, in order of name.
-  void reconstruct(const fs::path& folder) const {
+  void reconstruct(const fs::path& folder, const pipeline::Options& options = {}) const {
     std::vector<std::string> paths;
     for (const auto& entry : fs::directory_iterator(watched())) {
       if (entry.is_regular_file()) paths.push_back(entry.path().string());
     }
     std::ranges::sort(paths);
-    const auto record = pipeline::reconstruct(model(), paths, {}, {folder, false, {}}, Context(2));
+    const auto record = pipeline::reconstruct(model(), paths, options, {folder, false, {}}, Context(2));
     ASSERT_TRUE(record.has_value()) << record.error().message;
   }
 

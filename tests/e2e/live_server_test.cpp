@@ -159,7 +159,7 @@ TEST_F(LiveServer, ATakenPortIsToldByItsNumber) {
   start();
   ServerOptions options;
   options.port = port_;
-  const auto second = Server::start(*session_, watched(), options, {});
+  const auto second = Server::start(content_of(*session_), watched(), options, {});
   ASSERT_FALSE(second.has_value());
   EXPECT_EQ(second.error().code, ErrorCode::unwritable_output);
   EXPECT_THAT(second.error().message, testing::HasSubstr(std::to_string(port_)));

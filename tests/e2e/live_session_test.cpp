@@ -83,6 +83,19 @@ TEST_F(LiveSessionTest, RemovalReplacementAndDuplicatesLeaveNoTrace) {
   ASSERT_TRUE(session->remove(names_[0]).has_value());
   EXPECT_EQ(session->state()->scans.size(), 3U);
   EXPECT_EQ(session->state()->scans.back().file, "zz.ply");
+  // Replaced by another content, it leaves the name's copy to itself.
+  ASSERT_TRUE(session->add(put(names_[0], "zzz.ply")).has_value());
+  EXPECT_THAT(session->state()->duplicates, testing::ElementsAre(testing::Pair("zzz.ply", "zz.ply")));
+  ASSERT_TRUE(session->add(put(names_[1], "zz.ply")).has_value());
+  EXPECT_EQ(session->state()->scans.back().file, "zzz.ply");
+  ASSERT_TRUE(session->add(put(names_[0], "zzzz.ply")).has_value());
+  ASSERT_TRUE(io::write_file(watched() / "zzz.ply", "no scan").has_value());
+  ASSERT_TRUE(session->add((watched() / "zzz.ply").string()).has_value());
+  EXPECT_EQ(session->state()->scans.back().file, "zzzz.ply");
+  for (const char* name : {"zzz.ply", "zzzz.ply"}) {
+    fs::remove(watched() / name);
+    ASSERT_TRUE(session->remove(name).has_value());
+  }
   // Another content under a known name.
   fs::remove(watched() / "zz.ply");
   ASSERT_TRUE(session->remove("zz.ply").has_value());
@@ -102,11 +115,10 @@ TEST_F(LiveSessionTest, RemovalReplacementAndDuplicatesLeaveNoTrace) {
   EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
 }
 
-TEST_F(LiveSessionTest, AFirstLookAtALargeScanIsFollowedByTheWholeAndChangesNothing) {
-  simulate_scenes(2, 24);
+TEST_F(LiveSessionTest, TheVerdictOnADenseScanIsToldBeforeItIsCutOutOfAllPoints) {
+  simulate_scenes(2, 24, 0.0, 120000);
   LiveOptions options;
-  options.first_look_above = 10000;
-  options.first_look_points = 12000;
+  options.pipeline.detect.search_spacing_ratio = 0.2;  // so that these count as dense
   auto session = open(options);
   int provisional = 0;
   session->on_change = [&](const std::shared_ptr<const LiveState>& state) {
@@ -116,7 +128,7 @@ TEST_F(LiveSessionTest, AFirstLookAtALargeScanIsFollowedByTheWholeAndChangesNoth
   EXPECT_GE(provisional, 2);
   EXPECT_TRUE(std::ranges::none_of(session->state()->scans, &ScanState::provisional));
   ASSERT_TRUE(session->write_result({}).has_value());
-  reconstruct(base_ / "reference");
+  reconstruct(base_ / "reference", options.pipeline);
   EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
 }
 

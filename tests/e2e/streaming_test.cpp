@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "asbuilt/io/file.h"
 #include "asbuilt/pipeline.h"
 #include "asbuilt/simulate/simulate.h"
 #include "support/parts.h"
@@ -22,15 +23,28 @@ double rms_shift_mm(const Pose& a, const Pose& b, const TriangleMesh& part) {
   return std::sqrt(sum / static_cast<double>(part.vertices.size()));
 }
 
+// Three scans of a casing, one of them without it, written into a folder of their own.
+Result<simulate::Simulation> simulated_into(const fs::path& base, int points) {
+  fs::remove_all(base);
+  ASBUILT_TRY(
+      simulation,
+      simulate::simulate(test::casing(),
+                         {.scans = 3, .points = points, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2)));
+  ASBUILT_CHECK(simulate::write_simulation(base, simulation));
+  return std::move(simulation);
+}
+
+std::vector<std::string> scans_of(const simulate::Simulation& simulation, const fs::path& base) {
+  std::vector<std::string> scans;
+  for (const auto& scan : simulation.scans) scans.push_back((base / (scan.name + ".ply")).string());
+  return scans;
+}
+
 TEST(Streaming, AScanForcedThroughTheSieveGivesTheSameVerdictAndNearlyTheSamePose) {
   const fs::path base = fs::path(testing::TempDir()) / "asbuilt_streaming";
-  fs::remove_all(base);
-  const auto simulation = simulate::simulate(
-      test::casing(), {.scans = 3, .points = 120000, .seed = 21, .absent_share = 0.34, .as_built = {}}, Context(2));
+  const auto simulation = simulated_into(base, 120000);
   ASSERT_TRUE(simulation) << simulation.error().message;
-  ASSERT_TRUE(simulate::write_simulation(base, *simulation));
-  std::vector<std::string> scans;
-  for (const auto& scan : simulation->scans) scans.push_back((base / (scan.name + ".ply")).string());
+  const std::vector<std::string> scans = scans_of(*simulation, base);
 
   const auto detected = [&](double memory_gb, const std::string& output, Context context) {
     pipeline::Options options;
@@ -61,6 +75,52 @@ TEST(Streaming, AScanForcedThroughTheSieveGivesTheSameVerdictAndNearlyTheSamePos
     EXPECT_NEAR(static_cast<double>(b.segment_points) / static_cast<double>(a.segment_points), 1.0, 0.02) << a.name;
   }
   EXPECT_GE(compared, 1u) << "nothing was compared";
+  fs::remove_all(base);
+}
+
+TEST(Streaming, ADenseScanIsSearchedInFewerPointsAndThePartCutOutOfAll) {
+  const fs::path base = fs::path(testing::TempDir()) / "asbuilt_dense";
+  const auto simulation = simulated_into(base, 150000);
+  ASSERT_TRUE(simulation) << simulation.error().message;
+  const std::vector<std::string> scans = scans_of(*simulation, base);
+
+  int closer_looks = 0;
+  const auto detected = [&](double search_spacing_ratio, const std::string& output, int threads) {
+    pipeline::Options options;
+    options.detect.search_spacing_ratio = search_spacing_ratio;
+    pipeline::Output to{base / output, false, [&](std::string_view stage, std::string_view) {
+                          closer_looks += stage == "look_closer" ? 1 : 0;
+                        }};
+    return pipeline::detect((base / "model.ply").string(), scans, options, to, Context(threads));
+  };
+  const auto whole = detected(0.0, "whole", 2);
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ(closer_looks, 0);
+  const auto thinned = detected(0.2, "thinned", 2);
+  ASSERT_TRUE(thinned) << thinned.error().message;
+  EXPECT_GE(closer_looks, 1) << "nothing was thinned";
+
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const io::ScanRecord &a = whole->scans[i], &b = thinned->scans[i];
+    EXPECT_EQ(a.status, b.status) << a.name << ": " << a.reason << " / " << b.reason;
+    EXPECT_EQ(a.points, b.points);
+    EXPECT_NEAR(b.spacing / a.spacing, 1.0, 0.1) << a.name;
+    EXPECT_TRUE(b.warnings.empty()) << b.warnings.front();
+    if (!a.model_from_scan || !b.model_from_scan) continue;
+    const auto& truth = simulation->scans[i].model_from_scan;
+    ASSERT_TRUE(truth.has_value());
+    // The part as built is not the CAD, so that no registration to the CAD comes nearer than this; see `evaluate`.
+    EXPECT_LT(rms_shift_mm(*a.model_from_scan, *b.model_from_scan, simulation->model), 0.5 * simulation->noise_sigma_mm)
+        << a.name;
+    EXPECT_NEAR(static_cast<double>(b.segment_points) / static_cast<double>(a.segment_points), 1.0, 0.02) << a.name;
+  }
+  // The same bytes whatever the threads.
+  ASSERT_TRUE(detected(0.2, "by_one", 1));
+  for (const auto& entry : fs::recursive_directory_iterator(base / "thinned")) {
+    if (!entry.is_regular_file() || entry.path().filename() == "timing.json") continue;
+    const fs::path other = base / "by_one" / fs::relative(entry.path(), base / "thinned");
+    EXPECT_EQ(io::read_file(entry.path()).value(), io::read_file(other).value()) << other;
+  }
   fs::remove_all(base);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
 #include <span>
@@ -51,5 +52,19 @@ class CubeRows {
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> starts_;  // of each cube in order_; one more at the end
 };
+
+/// End of a run of points, neighbours in space, that begins with point `begin`: at most `most` of them, and their box's
+/// diagonal at most `widest`. `point_at(k)` tells the place of the k-th; one point is always a run.
+template <class Scalar, class PointAt>
+[[nodiscard]] std::size_t end_of_run(std::size_t begin, std::size_t end, std::size_t most, Scalar widest,
+                                     const PointAt& point_at) {
+  Eigen::AlignedBox<Scalar, 3> box(point_at(begin));
+  std::size_t at = begin + 1;
+  for (; at < std::min(end, begin + most); ++at) {
+    box.extend(point_at(at));
+    if (box.diagonal().squaredNorm() > widest * widest) break;
+  }
+  return at;
+}
 
 }  // namespace asbuilt

@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 
+#include "asbuilt/core/context.h"
+#include "asbuilt/core/parallel.h"
 #include "asbuilt/core/result.h"
 
 namespace asbuilt {
@@ -127,26 +129,18 @@ struct AllWithin {
   void offer(float distance, std::uint32_t index) { kept.push_back({index, distance}); }
 };
 
-float squared_reach(float distance) {
-  return std::isinf(distance) ? std::numeric_limits<float>::max() : distance * distance;
-}
-
-}  // namespace
-
-struct KdTree::Implementation {
-  explicit Implementation(std::span<const Eigen::Vector3f> source) : count(source.size()) {
-    ASBUILT_EXPECT(count < kNone, "fewer points than an index can tell apart");
-    if (source.empty()) return;
-    std::vector<IndexedPoint> points(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      points[i] = {{source[i].x(), source[i].y(), source[i].z()}, static_cast<std::uint32_t>(i)};
-    }
-    leaves.reserve(count / (kLeafSize / 2) + 1);
-    nodes.reserve(2 * leaves.capacity());
-    add(points);
-  }
+/// Nodes and leaves in the order in which they are made: a node, its left part, its right part.
+struct Subtree {
+  std::vector<Node> nodes;
+  std::vector<Leaf> leaves;
 
   Box add(std::span<IndexedPoint> points) {
+    leaves.reserve(points.size() / (kLeafSize / 2) + 1);
+    nodes.reserve(2 * leaves.capacity());
+    return add_below(points);
+  }
+
+  Box add_below(std::span<IndexedPoint> points) {
     const std::size_t own = nodes.size();
     nodes.emplace_back();
     const Box box = box_of(points);
@@ -157,9 +151,9 @@ struct KdTree::Implementation {
     }
     const std::size_t axis = widest_axis(box);
     const std::size_t left = cut(points, axis, box.low[axis], box.high[axis]);
-    const float left_end = add(points.first(left)).high[axis];
+    const float left_end = add_below(points.first(left)).high[axis];
     const auto right = static_cast<std::uint32_t>(nodes.size());
-    const float right_start = add(points.subspan(left)).low[axis];
+    const float right_start = add_below(points.subspan(left)).low[axis];
     nodes[own] = {left_end, right_start, static_cast<std::uint32_t>(axis), right};
     return box;
   }
@@ -167,11 +161,99 @@ struct KdTree::Implementation {
   void add_leaf(std::span<const IndexedPoint> points) {
     Leaf& leaf = leaves.emplace_back();
     for (auto& coordinates : leaf.place) coordinates.fill(std::numeric_limits<float>::infinity());
-    leaf.index.fill(kNone);
+    leaf.index.fill(KdTree::kNone);
     for (std::size_t i = 0; i < points.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) leaf.place[axis][i] = points[i].place[axis];
       leaf.index[i] = points[i].index;
     }
+  }
+
+  void append(const Subtree& other) {
+    const auto nodes_before = static_cast<std::uint32_t>(nodes.size());
+    const auto leaves_before = static_cast<std::uint32_t>(leaves.size());
+    for (Node node : other.nodes) {
+      node.other += node.axis == Node::kLeaf ? leaves_before : nodes_before;
+      nodes.push_back(node);
+    }
+    leaves.insert(leaves.end(), other.leaves.begin(), other.leaves.end());
+  }
+};
+
+float squared_reach(float distance) {
+  return std::isinf(distance) ? std::numeric_limits<float>::max() : distance * distance;
+}
+
+}  // namespace
+
+struct KdTree::Implementation {
+  /// Without a context, by the calling thread alone.
+  Implementation(std::span<const Eigen::Vector3f> source, const Context* context) : count(source.size()) {
+    constexpr std::size_t kFewest = 20000, kParts = 32;  // fewer points are not worth a thread
+    std::vector<IndexedPoint> points = indexed(source);
+    if (points.empty()) return;
+    if (context == nullptr || count <= kFewest) {
+      (void)tree.add(points);
+      return;
+    }
+    std::vector<Part> parts;
+    const std::size_t root = split(points, std::max(kFewest, count / kParts), parts);
+    parallel_for(*context, parts.size(), 1, [&](std::size_t p) {
+      Part& part = parts[p];
+      if (part.left == kNoPart) part.box = part.subtree.add(part.points);
+    });
+    (void)join(root, parts);
+  }
+
+  static constexpr std::size_t kNoPart = std::numeric_limits<std::size_t>::max();
+
+  /// A subtree that one thread builds, or a cut into two parts.
+  struct Part {
+    std::span<IndexedPoint> points;
+    std::size_t left = kNoPart, right = kNoPart;
+    std::size_t axis = 0;
+    Box box{};
+    Subtree subtree{};
+  };
+
+  static std::vector<IndexedPoint> indexed(std::span<const Eigen::Vector3f> source) {
+    ASBUILT_EXPECT(source.size() < kNone, "fewer points than an index can tell apart");
+    std::vector<IndexedPoint> points(source.size());
+    for (std::size_t i = 0; i < source.size(); ++i) {
+      points[i] = {{source[i].x(), source[i].y(), source[i].z()}, static_cast<std::uint32_t>(i)};
+    }
+    return points;
+  }
+
+  static std::size_t split(std::span<IndexedPoint> points, std::size_t most, std::vector<Part>& parts) {
+    const std::size_t own = parts.size();
+    parts.push_back({.points = points});
+    if (points.size() <= most) return own;
+    const Box box = box_of(points);
+    const std::size_t axis = widest_axis(box);
+    const std::size_t cut_at = cut(points, axis, box.low[axis], box.high[axis]);
+    parts[own].box = box;
+    parts[own].axis = axis;
+    const std::size_t left = split(points.first(cut_at), most, parts);
+    const std::size_t right = split(points.subspan(cut_at), most, parts);
+    parts[own].left = left;
+    parts[own].right = right;
+    return own;
+  }
+
+  // Appends a part's nodes and leaves, in the order in which one thread would have made them.
+  Box join(std::size_t at, const std::vector<Part>& parts) {
+    const Part& part = parts[at];
+    if (part.left == kNoPart) {
+      tree.append(part.subtree);
+      return part.box;
+    }
+    const std::size_t own = tree.nodes.size();
+    tree.nodes.emplace_back();
+    const float left_end = join(part.left, parts).high[part.axis];
+    const auto right = static_cast<std::uint32_t>(tree.nodes.size());
+    const float right_start = join(part.right, parts).low[part.axis];
+    tree.nodes[own] = {left_end, right_start, static_cast<std::uint32_t>(part.axis), right};
+    return part.box;
   }
 
   template <class ResultSet>
@@ -184,8 +266,8 @@ struct KdTree::Implementation {
   template <class ResultSet>
   void search(std::uint32_t at, const std::array<float, 3>& query, std::array<float, 3> apart,
               ResultSet& result) const {
-    while (nodes[at].axis != Node::kLeaf) {
-      const Node& node = nodes[at];
+    while (tree.nodes[at].axis != Node::kLeaf) {
+      const Node& node = tree.nodes[at];
       const float place = query[node.axis];
       std::array<float, 3> left = apart, right = apart;
       left[node.axis] = std::max(apart[node.axis], place - node.left_end);
@@ -197,7 +279,7 @@ struct KdTree::Implementation {
       if (!is_within(apart, result)) return;
       at = farther;
     }
-    search_leaf(leaves[nodes[at].other], query, result);
+    search_leaf(tree.leaves[tree.nodes[at].other], query, result);
   }
 
   template <class ResultSet>
@@ -223,11 +305,12 @@ struct KdTree::Implementation {
   }
 
   std::size_t count;
-  std::vector<Node> nodes;
-  std::vector<Leaf> leaves;
+  Subtree tree;
 };
 
-KdTree::KdTree(std::span<const Eigen::Vector3f> points) : implementation_(std::make_unique<Implementation>(points)) {}
+KdTree::KdTree(std::span<const Eigen::Vector3f> points, const Context& context)
+    : implementation_(std::make_unique<Implementation>(points, &context)) {}
+KdTree::KdTree(std::span<const Eigen::Vector3f> points) : implementation_(std::make_unique<Implementation>(points, nullptr)) {}
 KdTree::~KdTree() = default;
 KdTree::KdTree(KdTree&&) noexcept = default;
 KdTree& KdTree::operator=(KdTree&&) noexcept = default;

@@ -11,6 +11,8 @@
 
 namespace asbuilt {
 
+class Context;
+
 /// Nearest neighbours among fixed points. Built once, then const and safe to query from any thread.
 /// Equal distances go to the lower index. Copies the points; needs finite coordinates.
 class KdTree {
@@ -25,6 +27,8 @@ class KdTree {
   };
 
   explicit KdTree(std::span<const Eigen::Vector3f> points);
+  /// The same tree, built by all threads.
+  KdTree(std::span<const Eigen::Vector3f> points, const Context& context);
   ~KdTree();
   KdTree(KdTree&&) noexcept;
   KdTree& operator=(KdTree&&) noexcept;

@@ -7,6 +7,7 @@
 namespace asbuilt::detect {
 
 Result<void> DetectOptions::validate() const {
+  ASBUILT_CHECK(expect_between("search_spacing_ratio", search_spacing_ratio, 0.0, 0.3));
   ASBUILT_CHECK(expect_between("angle_bins", angle_bins, 3, 90));
   ASBUILT_CHECK(expect_between("distance_bin_ratio", distance_bin_ratio, 0.1, 10.0));
   ASBUILT_CHECK(expect_between("neighbour_bins", neighbour_bins, 1, int{Quantisation::kMostNeighbours}));

@@ -6,9 +6,11 @@
 namespace asbuilt::detect {
 
 struct DetectOptions {
-  int angle_bins = 15;              ///< bins over [0, pi] for each of the three angles of Eq. 6
-  double distance_bin_ratio = 1.0;  ///< width of a distance bin / sampling distance d
-  int neighbour_bins = 4;           ///< K of Eq. 8, at most 16 (a feature has 2^4 border neighbours); > 1
+  double search_spacing_ratio = 0.08;  ///< the part is sought in points about this share of the sampling distance apart
+                                       ///< where a scan has far more, and cut out of all; 0: always sought in all
+  int angle_bins = 15;                 ///< bins over [0, pi] for each of the three angles of Eq. 6
+  double distance_bin_ratio = 1.0;     ///< width of a distance bin / sampling distance d
+  int neighbour_bins = 4;              ///< K of Eq. 8, at most 16 (a feature has 2^4 border neighbours); > 1
   double border_reach = 0.35;  ///< a neighbouring bin counts only for values this close to it, in bins (0.5: always)
   double bucket_weight_exponent = 0.3;   ///< e of a vote's weight N_b^-e; paper: 1, which lets rare features rule
   double bucket_cap = 4.0;               ///< buckets with more than this many entries per model sample do not vote
@@ -33,6 +35,7 @@ struct DetectOptions {
     DetectOptions published = *this;
     published.paper_mode = true;
     published.bucket_weight_exponent = 1.0;
+    published.search_spacing_ratio = 0.0;
     published.border_reach = 0.5;
     published.peaks_per_reference = 1;
     published.first_reference_points = 0;
@@ -44,6 +47,8 @@ struct DetectOptions {
 
 template <class Visitor>
 void for_each_field(DetectOptions& options, Visitor&& field) {
+  field("search_spacing_ratio", options.search_spacing_ratio,
+        "spacing / sampling distance to which denser scans are thinned to find the part (0: never)");
   field("angle_bins", options.angle_bins, "bins over [0, 180] degrees for each angle of a point pair feature");
   field("distance_bin_ratio", options.distance_bin_ratio, "width of a distance bin / sampling distance");
   field("neighbour_bins", options.neighbour_bins, "K, bins that a scene feature activates (Eq. 8)");

@@ -28,17 +28,6 @@ double cube_edge(std::size_t points, const model::PreparedModel& model) {
                     model.diameter / kFewestCubesAcross);
 }
 
-/// Cuts a row of points, neighbours in space, into runs that fit into a ball not much larger than a cube.
-std::size_t end_of_run(std::span<const Eigen::Vector3d> points, std::size_t begin, double widest_mm) {
-  Eigen::AlignedBox3d box(points[begin]);
-  std::size_t end = begin + 1;
-  for (; end < points.size() && end - begin < kMostTogether; ++end) {
-    box.extend(points[end]);
-    if (box.diagonal().squaredNorm() > widest_mm * widest_mm) break;
-  }
-  return end;
-}
-
 }  // namespace
 
 Result<Feet> feet_of(const PointCloud& cloud, const Pose& model_from_cloud, const model::PreparedModel& model,
@@ -61,7 +50,7 @@ Result<Feet> feet_of(const PointCloud& cloud, const Pose& model_from_cloud, cons
       points[k] = model_from_cloud * cloud.positions[order[begin + k]].cast<double>();
     }
     for (std::size_t from = 0, to = 0; from < points.size(); from = to) {
-      to = end_of_run(points, from, 1.8 * edge);
+      to = end_of_run(from, points.size(), kMostTogether, 1.8 * edge, [&](std::size_t k) { return points[k]; });
       const auto found = surface.nearest_of_cluster(std::span(points).subspan(from, to - from));
       for (std::size_t k = from; k < to; ++k) {
         const auto& nearest = found[k - from];

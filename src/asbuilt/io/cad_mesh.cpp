@@ -181,7 +181,23 @@ Result<CadShape> read_iges(const std::filesystem::path& path, const Input& input
   return cad;
 }
 
+/// Whether a BREP text ends as whole ones do: behind the last shape, which a star closes, the shape of the file itself
+/// by its orientation, number and place ("+1 0"). OpenCASCADE does not come back from some that were cut before.
+bool has_root_of_brep(std::string_view content) {
+  const std::size_t star = content.rfind('*');
+  if (star == std::string_view::npos) return false;
+  std::istringstream rest{std::string(content.substr(star + 1, 100))};
+  char orientation = '\0';
+  int shape = 0, place = -1;
+  return rest >> orientation >> shape >> place &&
+         std::string_view("+-ie").find(orientation) != std::string_view::npos && shape > 0 && place >= 0;
+}
+
 Result<CadShape> read_brep(const Input& input) {
+  if (!has_root_of_brep(input.content)) {
+    return input.error_at_byte(input.content.size(),
+                               "the BREP file ends without its last line (as '+1 0'), it seems to be truncated");
+  }
   CadShape cad;
   std::istringstream stream{std::string(input.content)};
   BRep_Builder builder;

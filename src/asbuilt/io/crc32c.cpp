@@ -5,6 +5,12 @@
 #include <cstddef>
 #include <cstring>
 
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
+#include <nmmintrin.h>
+#define ASBUILT_CRC_INSTRUCTION 1
+#endif
+
 namespace asbuilt::io {
 namespace {
 
@@ -37,9 +43,39 @@ std::uint32_t word_at(const char* bytes) {
   return b[0] | (std::uint32_t{b[1]} << 8) | (std::uint32_t{b[2]} << 16) | (std::uint32_t{b[3]} << 24);
 }
 
+#ifdef ASBUILT_CRC_INSTRUCTION
+
+bool has_crc_instruction() {
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_SSE4_2) != 0;
+}
+
+__attribute__((target("sse4.2"))) std::uint32_t crc32c_by_instruction(std::string_view bytes) {
+  std::uint64_t crc = 0xffffffffu;
+  std::size_t i = 0;
+  for (; i + 8 <= bytes.size(); i += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes.data() + i, 8);
+    crc = _mm_crc32_u64(crc, word);
+  }
+  auto rest = static_cast<std::uint32_t>(crc);
+  for (; i < bytes.size(); ++i) rest = _mm_crc32_u8(rest, static_cast<unsigned char>(bytes[i]));
+  return ~rest;
+}
+
+#endif
+
 }  // namespace
 
 std::uint32_t crc32c(std::string_view bytes) {
+#ifdef ASBUILT_CRC_INSTRUCTION
+  static const bool is_there = has_crc_instruction();
+  if (is_there) return crc32c_by_instruction(bytes);
+#endif
+  return crc32c_by_tables(bytes);
+}
+
+std::uint32_t crc32c_by_tables(std::string_view bytes) {
   std::uint32_t crc = 0xffffffffu;
   std::size_t i = 0;
   for (; i + 8 <= bytes.size(); i += 8) {

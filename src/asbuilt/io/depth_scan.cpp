@@ -199,11 +199,11 @@ Result<std::vector<ScanFile>> read_depth_scan(const std::filesystem::path& path,
   ASBUILT_TRY(camera, camera_of(path, input, options.camera, source));
   RawPoints points;
   points.count = image.values.size();
-  points.position = [&](std::size_t i) {
+  points.positions = values_by_row<Eigen::Vector3d>([&](std::size_t i) {
     const double depth = image.values[i] / camera.steps;
     const auto x = static_cast<double>(i % image.width), y = static_cast<double>(i / image.width);
     return Eigen::Vector3d((x - camera.cx) / camera.fx * depth, (y - camera.cy) / camera.fy * depth, depth);
-  };
+  });
   ScanFile scan = assemble_scan(path, "png depth", points, options);
   scan.viewpoint_mm = Eigen::Vector3d::Zero();
   scan.grid = ScanGrid{image.height, image.width};

@@ -11,13 +11,14 @@
 #include <limits>
 #include <optional>
 
+#include "asbuilt/core/parallel.h"
 #include "asbuilt/io/number.h"
 
 namespace asbuilt::io {
 namespace {
 
-constexpr std::size_t kBatch = 4096;
-constexpr std::size_t kPadding = 16;  // so that eight bytes may be loaded at any bit of a stream
+constexpr std::size_t kBatch = 32768, kGrain = 2048;  // records that go on together, and that a thread decodes
+constexpr std::size_t kPadding = 16;                  // so that eight bytes may be loaded at any bit of a stream
 
 template <class T>
 T little_at(const char* bytes) {
@@ -44,36 +45,37 @@ class FieldStream {
     return (8 * static_cast<std::uint64_t>(size()) - bit_) / field_.bits;
   }
 
-  void take(std::size_t count, double* values) {
+  /// The `count` records after the first `begin` that were not taken. By any thread.
+  void read(std::size_t begin, std::size_t count, double* values) const {
+    const std::uint64_t bit = bit_ + static_cast<std::uint64_t>(begin) * field_.bits;
     switch (field_.kind) {
       case E57Field::Kind::float32:
-        take_floats<float>(count, values);
+        read_floats<float>(bit, count, values);
         break;
       case E57Field::Kind::float64:
-        take_floats<double>(count, values);
+        read_floats<double>(bit, count, values);
         break;
       case E57Field::Kind::integer:
-        take_integers(count, values, 1.0, 0.0);
+        read_integers(bit, count, values, 1.0, 0.0);
         break;
       default:
-        take_integers(count, values, field_.scale, field_.offset);
+        read_integers(bit, count, values, field_.scale, field_.offset);
     }
-    bit_ += static_cast<std::uint64_t>(count) * field_.bits;
   }
+  void take(std::size_t count) { bit_ += static_cast<std::uint64_t>(count) * field_.bits; }
 
  private:
   [[nodiscard]] std::size_t size() const { return bytes_.size() - kPadding; }
 
   template <class T>
-  void take_floats(std::size_t count, double* values) const {
-    const char* next = bytes_.data() + bit_ / 8;
+  void read_floats(std::uint64_t bit, std::size_t count, double* values) const {
+    const char* next = bytes_.data() + bit / 8;
     for (std::size_t i = 0; i < count; ++i, next += sizeof(T)) values[i] = static_cast<double>(little_at<T>(next));
   }
 
-  void take_integers(std::size_t count, double* values, double scale, double offset) const {
+  void read_integers(std::uint64_t bit, std::size_t count, double* values, double scale, double offset) const {
     const unsigned bits = field_.bits;
     const std::uint64_t mask = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-    std::uint64_t bit = bit_;
     for (std::size_t i = 0; i < count; ++i, bit += bits) {
       const char* word = bytes_.data() + bit / 8;
       const auto shift = static_cast<unsigned>(bit % 8);
@@ -257,36 +259,41 @@ std::uint64_t e57_records_that_fit(const E57Pages& pages, const E57Points& point
 }
 
 Result<void> for_each_e57_batch(const Input& input, E57Pages& pages, const E57Points& points,
-                                std::span<const std::size_t> wanted, const E57Batch& batch) {
+                                std::span<const std::size_t> wanted, const Context& context, const E57Batch& batch) {
   PacketReader packets(input, pages);
   ASBUILT_CHECK(packets.open(points));
   std::vector<FieldStream> streams;
   for (const std::size_t field : wanted) streams.emplace_back(points.fields[field]);
-  std::vector<std::vector<double>> values(wanted.size(), std::vector<double>(kBatch));
+  const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(points.records, kBatch));
+  std::vector<std::vector<double>> values(wanted.size(), std::vector<double>(most));
   std::vector<const double*> columns;
   for (const auto& column : values) columns.push_back(column.data());
 
-  std::uint64_t done = 0;
+  std::uint64_t done = 0, ready = 0;
   std::vector<std::string_view> pieces;
   while (done < points.records) {
-    ASBUILT_TRY(is_there, packets.next());
-    if (!is_there) {
-      return packets.error(
-          fmt::format("the points end after {} of {}, the file seems to be damaged", done, points.records));
+    const std::uint64_t left = points.records - done;
+    while (ready < std::min<std::uint64_t>(left, kBatch)) {
+      ASBUILT_TRY(is_there, packets.next());
+      if (!is_there) {
+        return packets.error(
+            fmt::format("the points end after {} of {}, the file seems to be damaged", done + ready, points.records));
+      }
+      ASBUILT_CHECK(packets.split(points.fields.size(), pieces));
+      ready = left;
+      for (std::size_t i = 0; i < streams.size(); ++i) {
+        streams[i].append(pieces[wanted[i]]);
+        ready = std::min(ready, streams[i].records());
+      }
     }
-    ASBUILT_CHECK(packets.split(points.fields.size(), pieces));
-    std::uint64_t ready = points.records - done;
-    for (std::size_t i = 0; i < streams.size(); ++i) {
-      streams[i].append(pieces[wanted[i]]);
-      ready = std::min(ready, streams[i].records());
-    }
-    while (ready > 0) {
-      const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(ready, kBatch));
-      for (std::size_t i = 0; i < streams.size(); ++i) streams[i].take(count, values[i].data());
-      batch(done, count, columns);
-      done += count;
-      ready -= count;
-    }
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(ready, kBatch));
+    parallel_for_blocks(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = 0; i < streams.size(); ++i) streams[i].read(begin, end - begin, values[i].data() + begin);
+    });
+    for (FieldStream& stream : streams) stream.take(count);
+    batch(done, count, columns);
+    done += count;
+    ready -= count;
   }
   return {};
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "asbuilt/core/context.h"
 #include "asbuilt/core/result.h"
 #include "asbuilt/io/e57_pages.h"
 #include "asbuilt/io/input.h"
@@ -44,10 +45,12 @@ struct E57Points {
 /// Records [first, first + count) of the fields that were asked for, a column each.
 using E57Batch = std::function<void(std::uint64_t first, std::size_t count, std::span<const double* const> columns)>;
 
-/// Decodes the wanted fields in the order of the file, some thousand records at a time: memory does not grow with the
-/// number of points. Errors: unreadable_input with the byte, and how many records there were.
+/// Decodes the wanted fields in the order of the file, at most 32 768 records at a time: memory does not grow with the
+/// number of points. The threads of the context share the decoding; `batch` is called by one. Errors: unreadable_input
+/// with the byte, and how many records there were.
 [[nodiscard]] Result<void> for_each_e57_batch(const Input& input, E57Pages& pages, const E57Points& points,
-                                              std::span<const std::size_t> wanted, const E57Batch& batch);
+                                              std::span<const std::size_t> wanted, const Context& context,
+                                              const E57Batch& batch);
 
 /// The most records that the file can hold, whatever it declares: each takes the bits of the wanted fields. Fields
 /// without bits are constants.

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "asbuilt/core/parallel.h"
 #include "asbuilt/io/e57_pages.h"
 #include "asbuilt/io/e57_points.h"
 #include "asbuilt/io/number.h"
@@ -95,8 +96,7 @@ struct ColourScale {
   std::array<double, 3> low{}, factor{};
 
   [[nodiscard]] std::uint8_t operator()(std::size_t channel, double value) const {
-    const double scaled = std::round((value - low[channel]) * factor[channel]);
-    return static_cast<std::uint8_t>(std::isfinite(scaled) ? std::clamp(scaled, 0.0, 255.0) : 0.0);
+    return nearest_byte((value - low[channel]) * factor[channel]);
   }
 };
 
@@ -124,13 +124,40 @@ Eigen::Vector3d cartesian(double range, double azimuth, double elevation) {
           range * std::sin(elevation)};
 }
 
-/// Where the i-th point of a batch is, in the file's unit; NaN where the sensor says that it is none.
-Eigen::Vector3d position_in(std::span<const double* const> batch, const Columns& columns, std::size_t i) {
-  const auto at = [&](std::ptrdiff_t column) { return batch[static_cast<std::size_t>(column)][i]; };
+using BatchColumns = std::span<const double* const>;
+
+const double* column_of(BatchColumns batch, std::ptrdiff_t column) { return batch[static_cast<std::size_t>(column)]; }
+
+/// Where points of a batch are, in the file's unit; NaN where the sensor says that there is none.
+void read_positions(BatchColumns batch, const Columns& columns, std::size_t first, std::span<Eigen::Vector3d> out) {
+  const double* const a = column_of(batch, columns.position[0]) + first;
+  const double* const b = column_of(batch, columns.position[1]) + first;
+  const double* const c = column_of(batch, columns.position[2]) + first;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = columns.is_spherical ? cartesian(a[i], b[i], c[i]) : Eigen::Vector3d(a[i], b[i], c[i]);
+  }
+  if (columns.invalid < 0) return;
   // 1 stands for a mere direction, 2 for nothing at all.
-  if (columns.invalid >= 0 && at(columns.invalid) != 0.0) return Eigen::Vector3d::Constant(kNaN);
-  const Eigen::Vector3d three(at(columns.position[0]), at(columns.position[1]), at(columns.position[2]));
-  return columns.is_spherical ? cartesian(three.x(), three.y(), three.z()) : three;
+  const double* const invalid = column_of(batch, columns.invalid) + first;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (invalid[i] != 0.0) out[i].setConstant(kNaN);
+  }
+}
+
+PointValues<Eigen::Vector3f> normals_of(BatchColumns batch, const Columns& columns) {
+  return values_by_row<Eigen::Vector3f>([x = column_of(batch, columns.normal[0]),
+                                         y = column_of(batch, columns.normal[1]),
+                                         z = column_of(batch, columns.normal[2])](std::size_t i) {
+    return Eigen::Vector3f(Eigen::Vector3d(x[i], y[i], z[i]).cast<float>());
+  });
+}
+
+PointValues<Rgb> colours_of(BatchColumns batch, const Columns& columns, const ColourScale& scale) {
+  return values_by_row<Rgb>([batch, colour = columns.colour, scale](std::size_t i) {
+    Rgb rgb;
+    for (std::size_t c = 0; c < 3; ++c) rgb[c] = scale(c, column_of(batch, colour[c])[i]);
+    return rgb;
+  });
 }
 
 /// Smallest and largest index of rows or columns.
@@ -149,16 +176,19 @@ class Probes {
  public:
   explicit Probes(std::size_t count) : count_(count) {}
 
-  /// In the order of the file, each point once.
-  void offer(std::uint64_t index, const Eigen::Vector3d& position) {
-    if (index != probe_index(next_, count_)) return;
-    positions_.push_back(position);
-    while (next_ < kOffsetProbes && probe_index(next_, count_) <= index) ++next_;
+  /// In the order of the file, each point once; `first` is the place of the first one of a batch.
+  void offer(std::uint64_t first, std::size_t size, BatchColumns batch, const Columns& columns) {
+    for (; next_ < std::min(kOffsetProbes, count_) && probe_index(next_, count_) < first + size; ++next_) {
+      Eigen::Vector3d position;
+      read_positions(batch, columns, static_cast<std::size_t>(probe_index(next_, count_) - first),
+                     std::span(&position, 1));
+      positions_.push_back(position);
+    }
   }
   [[nodiscard]] Eigen::Vector3d offset_mm(double mm_per_unit) const {
     RawPoints probed;
     probed.count = positions_.size();
-    probed.position = [&](std::size_t i) { return positions_[i]; };
+    probed.positions = values_in(positions_);
     return precision_offset_mm(probed, mm_per_unit);
   }
 
@@ -170,8 +200,13 @@ class Probes {
 class ScanReader {
  public:
   ScanReader(const Input& input, E57Pages& pages, const XmlElement& element, double mm_per_unit,
-             const PointSieve* sieve)
-      : input_(input), pages_(pages), element_(element), mm_per_unit_(mm_per_unit), sieve_(sieve) {}
+             const ReadOptions& options)
+      : input_(input),
+        pages_(pages),
+        element_(element),
+        mm_per_unit_(mm_per_unit),
+        sieve_(options.sieve.get()),
+        context_(options.threads()) {}
 
   Result<ScanFile> read() {
     const XmlElement* points_element = element_.child("points");
@@ -202,31 +237,39 @@ class ScanReader {
       reduced.invalid =
           reduced.add(static_cast<std::ptrdiff_t>(columns.wanted[static_cast<std::size_t>(columns.invalid)]));
     }
-    const auto positions = [&](const std::function<void(std::uint64_t, const Eigen::Vector3d&)>& take) {
-      return for_each_e57_batch(input_, pages_, points, reduced.wanted,
-                                [&](std::uint64_t first, std::size_t size, std::span<const double* const> batch) {
-                                  for (std::size_t i = 0; i < size; ++i)
-                                    take(first + i, position_in(batch, reduced, i));
-                                });
+    const auto each_batch = [&](const E57Batch& batch) {
+      return for_each_e57_batch(input_, pages_, points, reduced.wanted, context_, batch);
     };
+    Probes probes(count);
     if (sieve_ != nullptr && sieve_->applies_to(points.records)) {
       // The sieve needs to know the offset before the first point.
-      Probes probes(count);
-      ASBUILT_CHECK(positions([&](std::uint64_t i, const Eigen::Vector3d& position) { probes.offer(i, position); }));
+      ASBUILT_CHECK(each_batch([&](std::uint64_t first, std::size_t size, BatchColumns batch) {
+        probes.offer(first, size, batch, reduced);
+      }));
       scan.offset_mm = probes.offset_mm(mm_per_unit_);
       return read_attributes(points, columns, scan, nullptr);
     }
-    Probes probes(count);
     ASBUILT_CHECK(read_attributes(points, columns, scan, &probes));
     scan.offset_mm = probes.offset_mm(mm_per_unit_);
     if (scan.offset_mm.isZero(0.0)) return {};
     // Large coordinates are rare; only they are read a second time.
     MovedPositions moved(scan, mm_per_unit_);
-    scan.cloud.positions.clear();
-    scan.cloud.positions.reserve(count);
-    ASBUILT_CHECK(positions([&](std::uint64_t, const Eigen::Vector3d& position) { moved.add(position); }));
+    ASBUILT_CHECK(each_batch([&](std::uint64_t first, std::size_t size, BatchColumns batch) {
+      if (first + size > scan.cloud.size()) return;  // called off half-way
+      move_positions(batch, reduced, moved, std::span(scan.cloud.positions).subspan(first, size));
+    }));
     moved.note();
     return {};
+  }
+
+  void move_positions(BatchColumns batch, const Columns& columns, MovedPositions& moved,
+                      std::span<Eigen::Vector3f> out) const {
+    parallel_for_blocks(context_, out.size(), kPointsAtOnce, [&](std::size_t begin, std::size_t end) {
+      std::array<Eigen::Vector3d, kPointsAtOnce> raw;
+      const std::span positions(raw.data(), end - begin);
+      read_positions(batch, columns, begin, positions);
+      moved.move(positions, out.data() + begin);
+    });
   }
 
   /// `probes` is empty where the offset is known already.
@@ -243,35 +286,34 @@ class ScanReader {
       if (columns.intensity >= 0) scan.intensities.reserve(count);
     }
     MovedPositions moved(scan, mm_per_unit_);
-    SievedPoints kept(scan, sieve_, points.records);
+    SievedPoints kept(scan, sieve_, points.records, context_);
     IndexRange rows, grid_columns;
-    const auto take = [&](std::uint64_t first, std::size_t size, std::span<const double* const> batch) {
-      const auto column = [&](std::ptrdiff_t index) { return batch[static_cast<std::size_t>(index)]; };
+    std::vector<Eigen::Vector3f> positions;
+    const auto take = [&](std::uint64_t first, std::size_t size, BatchColumns batch) {
       if (kept.cancelled()) return;
-      for (std::size_t i = 0; i < size; ++i) {
-        const Eigen::Vector3d position = position_in(batch, columns, i);
-        if (probes != nullptr) probes->offer(first + i, position);
-        if (!kept.add(moved.moved(position))) continue;
+      if (probes != nullptr) probes->offer(first, size, batch, columns);
+      positions.resize(size);
+      move_positions(batch, columns, moved, positions);
+      kept.add(positions, [&](std::span<const std::uint32_t> staying) {
         if (columns.normal[0] >= 0) {
-          scan.cloud.normals.push_back(
-              Eigen::Vector3d(column(columns.normal[0])[i], column(columns.normal[1])[i], column(columns.normal[2])[i])
-                  .cast<float>());
+          append_values(scan.cloud.normals, normals_of(batch, columns), 0, staying, context_);
         }
-        if (has_colour) {
-          Rgb rgb;
-          for (std::size_t c = 0; c < 3; ++c) rgb[c] = colour(c, column(columns.colour[c])[i]);
-          scan.colours.push_back(rgb);
+        if (has_colour) append_values(scan.colours, colours_of(batch, columns, colour), 0, staying, context_);
+        if (columns.intensity >= 0) {
+          const auto intensity = [column = column_of(batch, columns.intensity)](std::size_t i) {
+            return static_cast<float>(column[i]);
+          };
+          append_values(scan.intensities, values_by_row<float>(intensity), 0, staying, context_);
         }
-        if (columns.intensity >= 0) scan.intensities.push_back(static_cast<float>(column(columns.intensity)[i]));
-      }
+      });
       if (columns.row >= 0 && columns.column >= 0) {
         for (std::size_t i = 0; i < size; ++i) {
-          rows.extend(column(columns.row)[i]);
-          grid_columns.extend(column(columns.column)[i]);
+          rows.extend(column_of(batch, columns.row)[i]);
+          grid_columns.extend(column_of(batch, columns.column)[i]);
         }
       }
     };
-    ASBUILT_CHECK(for_each_e57_batch(input_, pages_, points, columns.wanted, take));
+    ASBUILT_CHECK(for_each_e57_batch(input_, pages_, points, columns.wanted, context_, take));
     kept.finish();
     if (is_sifted) moved.note();
     if (rows.count() > 0 && grid_columns.count() > 0) scan.grid = ScanGrid{rows.count(), grid_columns.count()};
@@ -315,6 +357,7 @@ class ScanReader {
   const XmlElement& element_;
   double mm_per_unit_;
   const PointSieve* sieve_;
+  Context context_;
 };
 
 }  // namespace
@@ -334,7 +377,7 @@ Result<std::vector<ScanFile>> read_e57_scans(const std::filesystem::path& path, 
   for (std::size_t i = 0; i < data->children.size(); ++i) {
     Input part = input;
     if (data->children.size() > 1) part.name += fmt::format(", scan {}", i);
-    scans.push_back(ScanReader(part, pages, data->children[i], millimetres_per(unit), options.sieve.get()).read());
+    scans.push_back(ScanReader(part, pages, data->children[i], millimetres_per(unit), options).read());
   }
   ASBUILT_TRY(whole, readable_of(path, std::move(scans)));
   for (ScanFile& scan : whole) {

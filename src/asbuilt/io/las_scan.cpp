@@ -140,26 +140,25 @@ Result<std::vector<ScanFile>> read_las_scan(const std::filesystem::path& path, c
   RawPoints raw;
   raw.count = static_cast<std::size_t>(header.points);
   raw.rows = points.substr(0, raw.count * header.record_size);
-  raw.position = [&](std::size_t i) {
+  raw.positions = values_by_row<Eigen::Vector3d>([&](std::size_t i) {
     const std::size_t at = i * header.record_size;
     const Eigen::Vector3d whole(little_at<std::int32_t>(points, at), little_at<std::int32_t>(points, at + 4),
                                 little_at<std::int32_t>(points, at + 8));
     return Eigen::Vector3d(whole.cwiseProduct(header.scale) + header.offset);
-  };
-  raw.intensity = [&](std::size_t i) {
-    return static_cast<double>(little_at<std::uint16_t>(points, i * header.record_size + 12));
-  };
+  });
+  raw.intensities = values_by_row<float>(
+      [&](std::size_t i) { return static_cast<float>(little_at<std::uint16_t>(points, i * header.record_size + 12)); });
   const std::size_t colour = kFormats[static_cast<std::size_t>(header.format)].colour;
   const unsigned shift = colour != 0 && has_wide_colours(points, header, colour) ? 8 : 0;
   if (colour != 0) {
-    raw.colour = [&](std::size_t i) {
+    raw.colours = values_by_row<Rgb>([&](std::size_t i) {
       Rgb rgb;
       for (std::size_t c = 0; c < 3; ++c) {
         const unsigned value = little_at<std::uint16_t>(points, i * header.record_size + colour + 2 * c);
         rgb[c] = static_cast<std::uint8_t>(value >> shift);
       }
       return rgb;
-    };
+    });
   }
   ScanFile scan = assemble_scan(path, fmt::format("las 1.{}", header.minor), raw, options);
   if (options.unit == Unit::stated) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/io/lzf.h"
 
+#include <algorithm>
+#include <cstring>
+
 namespace asbuilt::io {
 
 // A stream is a row of runs. A control byte c below 32 announces c + 1 literal bytes. Otherwise its upper three bits
@@ -29,7 +32,13 @@ std::optional<std::string> lzf_expand(std::string_view compressed, std::size_t s
     if (in == compressed.size()) return std::nullopt;
     const std::size_t distance = ((control & 31u) << 8 | byte(in++)) + 1;
     if (distance > out || size - out < length) return std::nullopt;
-    for (std::size_t i = 0; i < length; ++i, ++out) expanded[out] = expanded[out - distance];
+    // A copy of `distance` bytes never overlaps what it comes from.
+    for (std::size_t left = length; left > 0;) {
+      const std::size_t run = std::min(left, distance);
+      std::memcpy(expanded.data() + out, expanded.data() + out - distance, run);
+      out += run;
+      left -= run;
+    }
   }
   if (out != size) return std::nullopt;
   return expanded;

@@ -31,17 +31,17 @@ struct Body {
 
 ScalarLoader loader(const PcdField& field) {
   constexpr auto kLittle = std::endian::little;
-  if (field.type == 'F') return field.size == 8 ? load_scalar<double, kLittle> : load_scalar<float, kLittle>;
+  if (field.type == 'F') return field.size == 8 ? scalar_loader<double, kLittle>() : scalar_loader<float, kLittle>();
   const bool is_signed = field.type == 'I';
   switch (field.size) {
     case 1:
-      return is_signed ? load_scalar<std::int8_t, kLittle> : load_scalar<std::uint8_t, kLittle>;
+      return is_signed ? scalar_loader<std::int8_t, kLittle>() : scalar_loader<std::uint8_t, kLittle>();
     case 2:
-      return is_signed ? load_scalar<std::int16_t, kLittle> : load_scalar<std::uint16_t, kLittle>;
+      return is_signed ? scalar_loader<std::int16_t, kLittle>() : scalar_loader<std::uint16_t, kLittle>();
     case 4:
-      return is_signed ? load_scalar<std::int32_t, kLittle> : load_scalar<std::uint32_t, kLittle>;
+      return is_signed ? scalar_loader<std::int32_t, kLittle>() : scalar_loader<std::uint32_t, kLittle>();
     default:
-      return is_signed ? load_scalar<std::int64_t, kLittle> : load_scalar<std::uint64_t, kLittle>;
+      return is_signed ? scalar_loader<std::int64_t, kLittle>() : scalar_loader<std::uint64_t, kLittle>();
   }
 }
 
@@ -88,7 +88,8 @@ Result<Body> read_ascii(const Input& input, const PcdHeader& header) {
   }
   const char* first = reinterpret_cast<const char*>(body.numbers.data());
   for (std::size_t f = 0; f < header.fields.size(); ++f, first += sizeof(double)) {
-    body.columns.push_back({first, header.fields.size() * sizeof(double), load_scalar<double, std::endian::native>});
+    body.columns.push_back(
+        {first, header.fields.size() * sizeof(double), scalar_loader<double, std::endian::native>()});
   }
   return body;
 }
@@ -160,24 +161,25 @@ Result<Body> read_body(const Input& input, const PcdHeader& header) {
 
 using Names = std::array<std::string_view, 3>;
 
-/// Where the points of three fields are, if all three fields are there.
-std::function<Eigen::Vector3d(std::size_t)> vectors_of(const PcdHeader& header, const Body& body, const Names& names) {
+/// The three columns of these names, if all are there.
+std::optional<std::array<StridedColumn, 3>> columns_named(const PcdHeader& header, const Body& body,
+                                                          const Names& names) {
   std::array<StridedColumn, 3> columns;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto field = header.find(names[axis]);
-    if (!field) return {};
+    if (!field) return std::nullopt;
     columns[axis] = body.columns[*field];
   }
-  return [columns](std::size_t i) { return Eigen::Vector3d(columns[0][i], columns[1][i], columns[2][i]); };
+  return columns;
 }
 
 /// PCL packs a colour into the bits of one number, 0x00RRGGBB, which the file may call a float.
-std::function<Rgb(std::size_t)> colours_of(const PcdHeader& header, const Body& body) {
+PointValues<Rgb> colours_of(const PcdHeader& header, const Body& body) {
   auto field = header.find("rgb");
   if (!field) field = header.find("rgba");
   if (!field || header.fields[*field].size != 4) return {};
   const bool is_real = header.fields[*field].type == 'F';
-  return [column = body.columns[*field], is_real](std::size_t i) {
+  return values_by_row<Rgb>([column = body.columns[*field], is_real](std::size_t i) {
     const double value = column[i];
     std::uint32_t bits = 0;
     if (is_real) {
@@ -187,7 +189,7 @@ std::function<Rgb(std::size_t)> colours_of(const PcdHeader& header, const Body& 
     }
     return Rgb{static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
                static_cast<std::uint8_t>(bits)};
-  };
+  });
 }
 
 /// The sensor's place, unless the header has the default pose, which most writers put there without knowing better.
@@ -212,13 +214,12 @@ Result<std::vector<ScanFile>> read_pcd_scan(const std::filesystem::path& path, c
   if (header.encoding == PcdEncoding::binary) {
     points.rows = input.content.substr(header.body_begin, points.count * header.point_size);
   }
-  points.position = vectors_of(header, body, {"x", "y", "z"});
-  points.normal = vectors_of(header, body, {"normal_x", "normal_y", "normal_z"});
-  if (!points.normal) points.normal = vectors_of(header, body, {"nx", "ny", "nz"});
-  points.colour = colours_of(header, body);
-  if (const auto field = header.find("intensity")) {
-    points.intensity = [column = body.columns[*field]](std::size_t i) { return column[i]; };
-  }
+  points.positions = positions_in(*columns_named(header, body, {"x", "y", "z"}));
+  auto normals = columns_named(header, body, {"normal_x", "normal_y", "normal_z"});
+  if (!normals) normals = columns_named(header, body, {"nx", "ny", "nz"});
+  if (normals) points.normals = normals_in(*normals);
+  points.colours = colours_of(header, body);
+  if (const auto field = header.find("intensity")) points.intensities = intensities_in(body.columns[*field]);
   ScanFile scan = assemble_scan(path, fmt::format("pcd {}", name_of(header.encoding)), points, options);
   if (header.height > 1) scan.grid = ScanGrid{header.height, header.width};
   std::ranges::move(body.notes, std::back_inserter(scan.notes));

@@ -17,21 +17,21 @@ template <std::endian order>
 ScalarLoader loader_in_order(PlyType type) {
   switch (type) {
     case PlyType::int8:
-      return load_scalar<std::int8_t, order>;
+      return scalar_loader<std::int8_t, order>();
     case PlyType::uint8:
-      return load_scalar<std::uint8_t, order>;
+      return scalar_loader<std::uint8_t, order>();
     case PlyType::int16:
-      return load_scalar<std::int16_t, order>;
+      return scalar_loader<std::int16_t, order>();
     case PlyType::uint16:
-      return load_scalar<std::uint16_t, order>;
+      return scalar_loader<std::uint16_t, order>();
     case PlyType::int32:
-      return load_scalar<std::int32_t, order>;
+      return scalar_loader<std::int32_t, order>();
     case PlyType::uint32:
-      return load_scalar<std::uint32_t, order>;
+      return scalar_loader<std::uint32_t, order>();
     case PlyType::float32:
-      return load_scalar<float, order>;
+      return scalar_loader<float, order>();
     case PlyType::float64:
-      return load_scalar<double, order>;
+      return scalar_loader<double, order>();
   }
   throw std::logic_error("asbuilt: expected a PLY type");
 }
@@ -162,7 +162,7 @@ Result<void> PlyBody::walk_binary(const PlyElement& element, Visitor& visitor) {
   };
   std::vector<Step> steps;
   for (const PlyProperty& property : element.properties) {
-    Step step{size_of(property.type), 0, loader(property.type, encoding_), nullptr};
+    Step step{size_of(property.type), 0, loader(property.type, encoding_), {}};
     if (property.is_list()) {
       step.count_size = size_of(*property.list_count_type);
       step.load_count = loader(*property.list_count_type, encoding_);
@@ -174,7 +174,7 @@ Result<void> PlyBody::walk_binary(const PlyElement& element, Visitor& visitor) {
   for (std::uint64_t row = 0; row < element.rows; ++row) {
     for (std::size_t p = 0; p < steps.size(); ++p) {
       const Step& step = steps[p];
-      if (step.load_count == nullptr) {
+      if (!step.load_count) {
         if (end - position_ < step.size) return ends_after(element, row);
         if constexpr (Visitor::kReadsValues) visitor.scalar(p, step.load(bytes + position_));
         position_ += step.size;
@@ -236,7 +236,7 @@ Result<PlyTable> PlyBody::read_scalars(const PlyElement& element) {
       table.columns.push_back({});
       continue;
     }
-    table.columns.push_back({first, scalars * sizeof(double), load_scalar<double, std::endian::native>});
+    table.columns.push_back({first, scalars * sizeof(double), scalar_loader<double, std::endian::native>()});
     if (table.rows > 0) first += sizeof(double);  // without rows there is nothing to point into
   }
   return table;

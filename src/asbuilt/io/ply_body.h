@@ -18,7 +18,7 @@ namespace asbuilt::io {
 /// must outlive the table), all others are parsed into `decoded`.
 struct PlyTable {
   std::size_t rows = 0;
-  std::vector<StridedColumn> columns;  ///< one per property; a list has load == nullptr
+  std::vector<StridedColumn> columns;  ///< one per property; a list has no `load`
   std::vector<double> decoded;
   std::string_view lies_in_file;  ///< the rows, where they were not parsed
 };

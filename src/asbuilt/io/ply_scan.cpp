@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
+#include <span>
 #include <string_view>
 
 #include "asbuilt/io/ply_body.h"
@@ -34,27 +34,22 @@ std::optional<Columns> normal_columns(const PlyElement& element, const PlyTable&
   return columns_named(element, table, {"normal_x", "normal_y", "normal_z"});
 }
 
-auto row_of(const Columns& columns) {
-  return [columns](std::size_t row) { return Eigen::Vector3d(columns[0][row], columns[1][row], columns[2][row]); };
-}
-
 /// Colours as bytes; reals are shares of 1, as some writers have them, and 16 bits are cut to 8.
-std::function<Rgb(std::size_t)> colours_in(const PlyElement& element, const PlyTable& table) {
+PointValues<Rgb> colours_in(const PlyElement& element, const PlyTable& table) {
   auto columns = columns_named(element, table, {"red", "green", "blue"});
-  std::string_view first = "red";
+  std::string_view name = "red";
   if (!columns)
-    columns = columns_named(element, table, {"diffuse_red", "diffuse_green", "diffuse_blue"}), first = "diffuse_red";
+    columns = columns_named(element, table, {"diffuse_red", "diffuse_green", "diffuse_blue"}), name = "diffuse_red";
   if (!columns) return {};
-  const PlyType type = element.properties[*element.find(first)].type;
+  const PlyType type = element.properties[*element.find(name)].type;
   const bool is_share = type == PlyType::float32 || type == PlyType::float64;
   const double factor = is_share ? 255.0 : type == PlyType::uint16 ? 1.0 / 257.0 : 1.0;
-  return [columns = *columns, factor](std::size_t row) {
-    Rgb rgb;
+  return [columns = *columns, factor](std::size_t first, std::span<Rgb> out) {
+    std::array<double, kPointsAtOnce> numbers;
     for (std::size_t c = 0; c < 3; ++c) {
-      const double value = std::round(columns[c][row] * factor);
-      rgb[c] = static_cast<std::uint8_t>(std::isfinite(value) ? std::clamp(value, 0.0, 255.0) : 0.0);
+      columns[c].read(first, out.size(), numbers.data(), 1);
+      for (std::size_t i = 0; i < out.size(); ++i) out[i][c] = nearest_byte(numbers[i] * factor);
     }
-    return rgb;
   };
 }
 
@@ -94,13 +89,13 @@ Result<std::vector<ScanFile>> read_ply_scan(const std::filesystem::path& path, c
   RawPoints points;
   points.count = table.rows;
   points.rows = table.lies_in_file;
-  points.position = row_of(*positions);
-  if (const auto normals = normal_columns(element, table)) points.normal = row_of(*normals);
-  points.colour = colours_in(element, table);
+  points.positions = positions_in(*positions);
+  if (const auto normals = normal_columns(element, table)) points.normals = normals_in(*normals);
+  points.colours = colours_in(element, table);
   for (const std::string_view name : {"intensity", "scalar_intensity", "scalar_Intensity"}) {
     const auto index = element.find(name);
     if (!index || element.properties[*index].is_list()) continue;
-    points.intensity = [column = table.columns[*index]](std::size_t row) { return column[row]; };
+    points.intensities = intensities_in(table.columns[*index]);
   }
   ScanFile scan = assemble_scan(path, fmt::format("ply {}", name_of(header.encoding)), points, options);
   std::ranges::move(notes_on_the_rest(body, header, *vertex + 1), std::back_inserter(scan.notes));

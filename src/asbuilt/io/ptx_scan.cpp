@@ -56,11 +56,9 @@ class PtxReader {
     ASBUILT_TRY(points, read_points(header));
     RawPoints raw;
     raw.count = points.positions.size();
-    raw.position = [&](std::size_t i) { return points.positions[i]; };
-    if (!points.intensities.empty()) {
-      raw.intensity = [&](std::size_t i) { return static_cast<double>(points.intensities[i]); };
-    }
-    if (!points.colours.empty()) raw.colour = [&](std::size_t i) { return points.colours[i]; };
+    raw.positions = values_in(points.positions);
+    if (!points.intensities.empty()) raw.intensities = values_in(points.intensities);
+    if (!points.colours.empty()) raw.colours = values_in(points.colours);
     ScanFile scan = assemble_scan(path_, "ptx", raw, options_);
     scan.grid = ScanGrid{header.rows, header.columns};
     place(header, scan);

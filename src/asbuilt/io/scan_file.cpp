@@ -21,7 +21,7 @@ Result<std::vector<ScanFile>> scan_from_mesh(const std::filesystem::path& path, 
   if (read->vertices.empty()) return input.error("the file holds no points");
   RawPoints points;
   points.count = read->vertices.size();
-  points.position = [&](std::size_t i) { return read->vertices[i]; };
+  points.positions = values_in(read->vertices);
   ScanFile scan = assemble_scan(path, std::move(format), points, options);
   scan.notes.emplace_back("The file is a mesh: its vertices were taken as points.");
   const bool is_text = scan.format != "stl binary";

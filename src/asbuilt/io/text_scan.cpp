@@ -16,7 +16,8 @@ namespace {
 
 /// The points of one scan. PTS files may hold several, each headed by its count.
 struct Block {
-  std::vector<Eigen::Vector3d> positions, normals;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Vector3f> normals;
   std::vector<Rgb> colours;
   std::vector<float> intensities;
   std::optional<std::uint64_t> declared;
@@ -80,7 +81,7 @@ class TextReader {
       return error(fmt::format("there are more points than the {} declared", *block.declared));
     }
     block.positions.push_back(vector_of(layout_.position));
-    if (layout_.normal) block.normals.push_back(vector_of(*layout_.normal));
+    if (layout_.normal) block.normals.push_back(vector_of(*layout_.normal).cast<float>());
     if (layout_.colour) block.colours.push_back(colour_of(*layout_.colour));
     if (layout_.intensity) block.intensities.push_back(static_cast<float>(numbers_[*layout_.intensity]));
     return {};
@@ -130,10 +131,10 @@ Result<std::vector<ScanFile>> read_text_scan(const std::filesystem::path& path, 
   for (const Block& block : blocks) {
     RawPoints points;
     points.count = block.positions.size();
-    points.position = [&](std::size_t i) { return block.positions[i]; };
-    if (layout.normal) points.normal = [&](std::size_t i) { return block.normals[i]; };
-    if (layout.colour) points.colour = [&](std::size_t i) { return block.colours[i]; };
-    if (layout.intensity) points.intensity = [&](std::size_t i) { return static_cast<double>(block.intensities[i]); };
+    points.positions = values_in(block.positions);
+    if (layout.normal) points.normals = values_in(block.normals);
+    if (layout.colour) points.colours = values_in(block.colours);
+    if (layout.intensity) points.intensities = values_in(block.intensities);
     ScanFile scan = assemble_scan(path, format_of(path), points, options);
     scan.notes.insert(scan.notes.begin(), layout.notes.begin(), layout.notes.end());
     scan.index_in_file = static_cast<int>(scans.size());

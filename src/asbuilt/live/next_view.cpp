@@ -75,12 +75,12 @@ SensorLimits assumed_limits(double diameter_mm) {
   return {25.0, 0.3 * diameter_mm, 4.0 * diameter_mm, 1.5 * diameter_mm, "assumed"};
 }
 
-SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const PointCloud& part_in_scan,
-                         const Eigen::Vector3d& viewpoint_in_scan) {
+SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3d& viewpoint_in_scan,
+                         const Eigen::Vector3d& middle_of_part_in_scan, double diameter_mm) {
   // A few thousand points tell as much as all of them.
   const std::size_t stride = std::max<std::size_t>(1, points.size() / 4000);
   std::vector<Eigen::Vector3d> directions;
-  std::vector<double> ranges, part_ranges;
+  std::vector<double> ranges;
   for (std::size_t i = 0; i < points.size(); i += stride) {
     const Eigen::Vector3d ray = points[i].cast<double>() - viewpoint_in_scan;
     const double range = ray.norm();
@@ -88,12 +88,8 @@ SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const Point
     directions.push_back(ray / range);
     ranges.push_back(range);
   }
-  const std::size_t part_stride = std::max<std::size_t>(1, part_in_scan.size() / 4000);
-  for (std::size_t i = 0; i < part_in_scan.size(); i += part_stride) {
-    part_ranges.push_back((part_in_scan.positions[i].cast<double>() - viewpoint_in_scan).norm());
-  }
   SensorLimits limits;
-  if (directions.empty() || part_ranges.empty()) return limits;
+  if (directions.empty()) return limits;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& d : directions) mean += d;
   std::vector<double> angles;
@@ -102,9 +98,10 @@ SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const Point
     angles.push_back(std::acos(std::clamp(d.dot(mean.normalized()), -1.0, 1.0)) / kDegree);
   }
   limits.half_angle_deg = all_around ? 180.0 : std::max(5.0, quantile(angles, 0.90));
-  limits.near_mm = quantile(ranges, 0.01);
-  limits.far_mm = quantile(ranges, 0.99);
-  limits.distance_mm = quantile(part_ranges, 0.5);
+  limits.distance_mm = (middle_of_part_in_scan - viewpoint_in_scan).norm();
+  const double radius = 0.5 * diameter_mm;
+  limits.near_mm = std::max(0.0, std::min(quantile(ranges, 0.01), limits.distance_mm - radius));
+  limits.far_mm = std::max(quantile(ranges, 0.99), limits.distance_mm + radius);
   limits.source = "learnt";
   return limits;
 }
@@ -157,8 +154,10 @@ ViewPlanner::ViewPlanner(const Surface& surface, const model::PreparedModel& mod
     nearest_sample_[v] = same_way.found() ? same_way.index : tree.nearest(positions[v]).index;
   });
   sample_area_.assign(samples_.size(), 0.0);
+  vertex_area_.resize(positions.size());
   for (std::size_t v = 0; v < positions.size(); ++v) {
-    sample_area_[nearest_sample_[v]] += surface.area_mm2[v] / surface.total_area_mm2;
+    vertex_area_[v] = surface.area_mm2[v] / surface.total_area_mm2;
+    sample_area_[nearest_sample_[v]] += vertex_area_[v];
   }
 
   sees_.assign(candidates_.size() * samples_.size(), 0);
@@ -192,6 +191,17 @@ double ViewPlanner::coverable_share() const {
   return std::min(sum, 1.0);
 }
 
+std::vector<double> ViewPlanner::seen_shares(const std::vector<char>& seen) const {
+  std::vector<double> shares(samples_.size(), 0.0);
+  for (std::size_t v = 0; v < seen.size(); ++v) {
+    if (seen[v] != 0) shares[nearest_sample_[v]] += vertex_area_[v];
+  }
+  for (std::size_t s = 0; s < shares.size(); ++s) {
+    shares[s] = sample_area_[s] > 0.0 ? std::min(1.0, shares[s] / sample_area_[s]) : 0.0;
+  }
+  return shares;
+}
+
 namespace {
 
 struct Worth {
@@ -202,24 +212,22 @@ struct Worth {
 
 std::vector<ViewProposal> ViewPlanner::best_views(const std::vector<std::vector<char>>& seen_by_component) const {
   const std::size_t pieces = seen_by_component.size(), count = samples_.size();
-  // What each component has seen, sample by sample.
-  std::vector<std::vector<char>> has(pieces, std::vector<char>(count, 0));
-  std::vector<char> any(count, 0);
-  for (std::size_t k = 0; k < pieces; ++k) {
-    for (std::size_t s = 0; s < count; ++s) {
-      has[k][s] = seen_by_component[k][samples_[s]];
-      any[s] = static_cast<char>(any[s] | has[k][s]);
-    }
+  std::vector<std::vector<double>> has;
+  std::vector<char> seen_by_any(nearest_sample_.size(), 0);
+  for (const std::vector<char>& seen : seen_by_component) {
+    has.push_back(seen_shares(seen));
+    for (std::size_t v = 0; v < seen.size(); ++v) seen_by_any[v] = static_cast<char>(seen_by_any[v] | seen[v]);
   }
+  const std::vector<double> any = seen_shares(seen_by_any);
   const auto worth = [&](std::size_t c, std::size_t other) {
     Worth sum;
     for (std::size_t s = 0; s < count; ++s) {
       const double area = sample_area_[s] * static_cast<double>(sees(c, s));
       if (area <= 0.0) continue;
       sum.seen += area;
-      if (!any[s]) sum.gain += area;
-      if (pieces > 0 && has[0][s]) sum.overlap_first += area;
-      if (other > 0 && has[other][s]) sum.overlap_other += area;
+      sum.gain += (1.0 - any[s]) * area;
+      if (pieces > 0) sum.overlap_first += has[0][s] * area;
+      if (other > 0) sum.overlap_other += has[other][s] * area;
     }
     return sum;
   };

@@ -26,10 +26,12 @@ struct SensorLimits {
 /// Before anything is known: as far from the part as it is long and a half, all of it in view.
 [[nodiscard]] SensorLimits assumed_limits(double diameter_mm);
 
-/// What one scan shows of its sensor, `points` in the scan frame, the sensor at `viewpoint`. `part` are those on the
-/// part.
-[[nodiscard]] SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points, const PointCloud& part_in_scan,
-                                       const Eigen::Vector3d& viewpoint_in_scan);
+/// What one scan shows of its sensor, `points` in the scan frame, the sensor at `viewpoint`, the middle of the part
+/// where it was found. The range is at least what it takes to see the whole part from that distance, whichever way it
+/// is turned: nothing says that the nearest surface so far was the nearest that can be measured.
+[[nodiscard]] SensorLimits limits_seen(const std::vector<Eigen::Vector3f>& points,
+                                       const Eigen::Vector3d& viewpoint_in_scan,
+                                       const Eigen::Vector3d& middle_of_part_in_scan, double diameter_mm);
 /// Of several scans: the widest cone and range, the median distance. Precondition: at least one.
 [[nodiscard]] SensorLimits learnt_limits(const std::vector<SensorLimits>& seen);
 
@@ -79,9 +81,13 @@ class ViewPlanner {
  private:
   SensorLimits limits_;
   std::vector<SensorView> candidates_;
+  /// Of the surface that each sample stands for, the share that was seen.
+  [[nodiscard]] std::vector<double> seen_shares(const std::vector<char>& seen) const;
+
   std::vector<std::uint32_t> samples_;         // vertices
   std::vector<double> sample_area_;            // shares of the skin that each stands for
   std::vector<std::uint32_t> nearest_sample_;  // of each vertex
+  std::vector<double> vertex_area_;            // shares of the skin
   std::vector<std::uint8_t> sees_;             // candidates x samples
   std::vector<char> coverable_;                // by sample
 };

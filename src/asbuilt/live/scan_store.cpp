@@ -3,9 +3,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <nlohmann/json.hpp>
 
 #include "asbuilt/io/file.h"
@@ -28,6 +31,21 @@ void sync_folder(const fs::path& folder) {
   ::close(descriptor);
 }
 
+// Two programs in one folder would take each other's scans for leftovers. The system lets go of it when one is killed.
+Result<std::shared_ptr<const int>> locked(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return unwritable(folder, {errno, std::generic_category()});
+  std::shared_ptr<const int> lock(new int(descriptor), [](const int* held) {
+    ::close(*held);
+    delete held;
+  });
+  // Some network shares know no locks: better unguarded than not at all.
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return lock;
+  return fail(ErrorCode::unwritable_output,
+              fmt::format("{}: another asbuilt live works in this folder; end it, or choose another --output",
+                          folder.string()));
+}
+
 std::string sidecar(const std::optional<SensorLimits>& limits, std::uint64_t order) {
   Json json{{"order", order}};
   if (limits) {
@@ -37,6 +55,18 @@ std::string sidecar(const std::optional<SensorLimits>& limits, std::uint64_t ord
                       {"distance", limits->distance_mm}};
   }
   return json.dump() + "\n";
+}
+
+// None, where anything about it is no number: it is learnt anew from the next scans.
+std::optional<SensorLimits> limits_of(const Json& json) {
+  std::array<double, 4> values{};
+  constexpr std::array<const char*, 4> kNames{"half_angle", "near", "far", "distance"};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto found = json.find(kNames[i]);
+    if (found == json.end() || !found->is_number()) return std::nullopt;
+    values[i] = found->get<double>();
+  }
+  return SensorLimits{values[0], values[1], values[2], values[3], "learnt"};
 }
 
 Result<StoredFile> read_stored(const fs::path& folder) {
@@ -60,8 +90,7 @@ Result<StoredFile> read_stored(const fs::path& folder) {
   }
   stored.order = json["order"].get<std::uint64_t>();
   if (const auto sensor = json.find("sensor"); sensor != json.end() && sensor->is_object()) {
-    const auto value = [&](const char* name) { return sensor->value(name, 0.0); };
-    stored.limits = SensorLimits{value("half_angle"), value("near"), value("far"), value("distance"), "learnt"};
+    stored.limits = limits_of(*sensor);
   }
   return stored;
 }
@@ -74,6 +103,8 @@ Result<ScanStore> ScanStore::open(const fs::path& folder, std::vector<std::strin
   std::error_code error;
   fs::create_directories(folder / "scans", error);
   if (error) return unwritable(folder / "scans", error);
+  ASBUILT_TRY(lock, locked(folder));
+  store.lock_ = std::move(lock);
   fs::remove_all(folder / "unfinished", error);  // what was being judged is judged again
   fs::remove_all(folder / "replaced", error);
   std::vector<fs::path> present;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,7 +29,8 @@ struct StoredFile {
 class ScanStore {
  public:
   /// Removes what an interrupted session left unfinished, and reads the rest. A folder that cannot be read is taken
-  /// away (its scan will be judged again) and named in `lost`. Errors: unwritable_output, unreadable_input (live.json).
+  /// away (its scan will be judged again) and named in `lost`. The folder is this store's as long as it lives, or its
+  /// program. Errors: unwritable_output (also: another program works in it), unreadable_input (live.json).
   [[nodiscard]] static Result<ScanStore> open(const std::filesystem::path& folder, std::vector<std::string>& lost);
 
   /// In canonical order: by file name, bytewise.
@@ -48,6 +50,7 @@ class ScanStore {
   [[nodiscard]] std::filesystem::path folder_of(const std::string& file) const { return folder_ / "scans" / file; }
 
   std::filesystem::path folder_;
+  std::shared_ptr<const int> lock_;  // descriptor; closed with the last owner
   std::map<std::string, StoredFile> files_;
   std::map<std::string, std::string> removed_;
   std::uint64_t next_order_ = 0;

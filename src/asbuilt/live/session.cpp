@@ -101,10 +101,7 @@ Result<void> LiveSession::remove(const std::string& file) {
     own.next.refinement = "due";
   }
   own.publish(on_change);
-  for (const auto& [duplicate, original] : std::map(own.duplicates)) {
-    if (original == file) return add(own.duplicate_paths[duplicate]);  // it takes the others along
-  }
-  return {};
+  return own.add_former_copy_of(file, *this);
 }
 
 Result<bool> LiveSession::take_out(const std::string& file) {

@@ -19,9 +19,7 @@ namespace asbuilt::live {
 
 struct LiveOptions {
   pipeline::Options pipeline;
-  std::optional<SensorLimits> sensor;      ///< of the proposals; learnt from the scans if not given
-  std::size_t first_look_above = 300000;   ///< points from which a thinned copy is judged first; the rest follows
-  std::size_t first_look_points = 150000;  ///< that it has about
+  std::optional<SensorLimits> sensor;  ///< of the proposals; learnt from the scans if not given
 };
 
 /// A session of scanning, for a program that acquires scans: give it each file as it comes, show its state.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -83,8 +84,11 @@ struct LiveSession::Implementation {
 
   // session_scan.cpp
 
-  /// A first look at a large file, on a thinned copy of each scan. Nothing if it fails: the whole will tell.
-  [[nodiscard]] std::optional<FileEntries> first_look(const pipeline::InputFile& input, const pipeline::ScanHalf& half);
+  /// What is shown of a scan that has been found and is still being cut out of all its points.
+  [[nodiscard]] std::vector<Entry> early_entries(const pipeline::InputFile& input, const io::ScanFile& scan,
+                                                 std::span<const pipeline::JudgedScan> judged) const;
+  /// A file is gone or has another content: what was a copy of it counts now.
+  [[nodiscard]] Result<void> add_former_copy_of(const std::string& file, LiveSession& session);
   /// New proposals, if the scans tell another sensor than the one reckoned with.
   void learn_sensor();
 

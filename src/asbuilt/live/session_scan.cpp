@@ -15,33 +15,29 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// Points that a file may lose without changing what is seen at a first look: no colours, no grid, every n-th point.
-io::ScanFile thinned(const io::ScanFile& file, std::size_t wanted) {
-  io::ScanFile thin = file;
-  thin.colours.clear();
-  thin.intensities.clear();
-  thin.grid.reset();
-  thin.cloud = {};
-  const std::size_t stride = std::max<std::size_t>(1, file.cloud.size() / wanted);
-  for (std::size_t i = 0; i < file.cloud.size(); i += stride) {
-    thin.cloud.positions.push_back(file.cloud.positions[i]);
-    if (file.cloud.has_normals()) thin.cloud.normals.push_back(file.cloud.normals[i]);
-  }
-  return thin;
-}
-
 std::optional<Eigen::Vector3d> local_viewpoint(const io::ScanRecord& scan) {
   if (!scan.viewpoint || scan.viewpoint_kind != "point") return std::nullopt;
   return Eigen::Vector3d(*scan.viewpoint - scan.offset);
 }
 
-std::optional<SensorLimits> limits_of(const std::vector<io::ScanFile>& files, const std::vector<Entry>& entries) {
+/// Every n-th point.
+std::vector<Eigen::Vector3f> outline_of(const PointCloud& cloud) {
+  constexpr std::size_t kAbout = 4000;
+  const std::size_t stride = std::max<std::size_t>(1, cloud.size() / kAbout);
+  std::vector<Eigen::Vector3f> some;
+  for (std::size_t i = 0; i < cloud.size(); i += stride) some.push_back(cloud.positions[i]);
+  return some;
+}
+
+std::optional<SensorLimits> limits_of(const std::vector<std::vector<Eigen::Vector3f>>& outlines,
+                                      const std::vector<Entry>& entries, const model::PreparedModel& model) {
   std::vector<SensorLimits> seen;
   for (const Entry& entry : entries) {
     const auto viewpoint = local_viewpoint(entry.record);
     const auto index = static_cast<std::size_t>(entry.record.index_in_file);
-    if (!entry.posed || !viewpoint || index >= files.size() || files[index].cloud.empty()) continue;
-    seen.push_back(limits_seen(files[index].cloud.positions, entry.posed->part, *viewpoint));
+    if (!entry.posed || !viewpoint || index >= outlines.size() || outlines[index].empty()) continue;
+    const Eigen::Vector3d middle = entry.posed->model_from_local_detected.inverse() * model.box.center().eval();
+    seen.push_back(limits_seen(outlines[index], *viewpoint, middle, model.diameter));
   }
   return seen.empty() ? std::nullopt : std::optional(learnt_limits(seen));
 }
@@ -59,6 +55,13 @@ std::string sound_of(const FileEntries& group) {
 
 }  // namespace
 
+Result<void> LiveSession::Implementation::add_former_copy_of(const std::string& file, LiveSession& session) {
+  for (const auto& [duplicate, original] : duplicates) {
+    if (original == file) return session.add(std::string(duplicate_paths[duplicate]));  // takes the others along
+  }
+  return {};
+}
+
 void LiveSession::Implementation::learn_sensor() {
   if (options.sensor) return;
   std::vector<SensorLimits> seen;
@@ -71,43 +74,37 @@ void LiveSession::Implementation::learn_sensor() {
   planner = std::make_unique<ViewPlanner>(surface, model.prepared, learnt, context);
 }
 
-std::optional<FileEntries> LiveSession::Implementation::first_look(const pipeline::InputFile& input,
-                                                                   const pipeline::ScanHalf& half) {
-  FileEntries group;
-  group.provisional = true;
-  for (const io::ScanFile& file : *input.scans) {
-    Context quiet = context;
-    quiet.warning = nullptr;
-    auto judged = pipeline::judge_scan(thinned(file, options.first_look_points), half, *run, quiet);
-    if (!judged) return std::nullopt;
-    for (pipeline::JudgedScan& scan : *judged) {
-      Entry entry;
-      entry.record = std::move(scan.record);
-      entry.record.path = input.path;
-      entry.record.name = pipeline::entry_name(file.name, entry.record.instance);
-      entry.record.sha256 = input.sha256;
-      entry.record.index_in_file = file.index_in_file;
-      if (scan.segment && entry.record.status == io::ScanStatus::accepted) {
-        pipeline::PosedScan posed;
-        for (std::size_t i = 0; i < scan.segment->cloud.size(); ++i) {
-          if (!scan.segment->is_part[i]) continue;
-          posed.part.positions.push_back(scan.segment->cloud.positions[i]);
-          posed.part.normals.push_back(scan.segment->cloud.normals[i]);
-        }
-        posed.model_from_local_detected = *entry.record.model_from_scan * Eigen::Translation3d(entry.record.offset);
-        posed.model_from_local_start = posed.model_from_local = posed.model_from_local_detected;
-        posed.noise_sigma_mm = entry.record.noise_sigma;
-        posed.spacing_mm = entry.record.spacing;
-        if (const auto viewpoint = local_viewpoint(entry.record)) {
-          posed.viewpoint = {scan::Viewpoint::Kind::point, *viewpoint};
-        }
-        thin(posed);
-        if (!posed.part.empty()) entry.posed = std::move(posed);
+std::vector<Entry> LiveSession::Implementation::early_entries(const pipeline::InputFile& input,
+                                                              const io::ScanFile& scan,
+                                                              std::span<const pipeline::JudgedScan> judged) const {
+  std::vector<Entry> entries;
+  for (const pipeline::JudgedScan& found : judged) {
+    Entry entry;
+    entry.record = found.record;
+    entry.record.path = input.path;
+    entry.record.name = pipeline::entry_name(scan.name, entry.record.instance);
+    entry.record.sha256 = input.sha256;
+    entry.record.index_in_file = scan.index_in_file;
+    if (found.segment && entry.record.status == io::ScanStatus::accepted) {
+      pipeline::PosedScan posed;
+      for (std::size_t i = 0; i < found.segment->cloud.size(); ++i) {
+        if (!found.segment->is_part[i]) continue;
+        posed.part.positions.push_back(found.segment->cloud.positions[i]);
+        posed.part.normals.push_back(found.segment->cloud.normals[i]);
       }
-      group.entries.push_back(std::move(entry));
+      posed.model_from_local_detected = *entry.record.model_from_scan * Eigen::Translation3d(entry.record.offset);
+      posed.model_from_local_start = posed.model_from_local = posed.model_from_local_detected;
+      posed.noise_sigma_mm = entry.record.noise_sigma;
+      posed.spacing_mm = entry.record.spacing;
+      if (const auto viewpoint = local_viewpoint(entry.record)) {
+        posed.viewpoint = {scan::Viewpoint::Kind::point, *viewpoint};
+      }
+      thin(posed);
+      if (!posed.part.empty()) entry.posed = std::move(posed);
     }
+    entries.push_back(std::move(entry));
   }
-  return group;
+  return entries;
 }
 
 Result<void> LiveSession::add(const std::string& path) {
@@ -144,35 +141,29 @@ Result<void> LiveSession::add(const std::string& path) {
       own.duplicate_paths[file] = path;
       own.publish(on_change);
       note("info", file, fmt::format("{} is the same file as {} and counts once", file, other));
-      return {};
+      return own.add_former_copy_of(file, *this);
     }
     outdone = other;
   }
 
   set_phase("judging", file);
-  const pipeline::ScanHalf half = own.shared.half(own.model, own.options.pipeline);
+  pipeline::ScanHalf half = own.shared.half(own.model, own.options.pipeline);
   ASBUILT_TRY(folder, own.store->begin(file));
-  const bool large = input.scans && std::ranges::any_of(*input.scans, [&](const io::ScanFile& scan) {
-                       return scan.cloud.size() > own.options.first_look_above;
-                     });
   bool told = false;
-  if (large) {
-    try {
-      if (auto looked = own.first_look(input, half)) {
-        looked->seconds = since();
-        const std::string sound = sound_of(*looked);
-        own.show(file, std::move(*looked));
-        own.publish(on_change, sound);
-        told = true;
-      }
-    } catch (const std::bad_alloc&) {  // the whole will tell
-    }
-  }
+  std::vector<Entry> found_early;  // of all scans of the file so far
+  half.early_verdict = [&](const io::ScanFile& scan, std::span<const pipeline::JudgedScan> judged) {
+    std::ranges::move(own.early_entries(input, scan, judged), std::back_inserter(found_early));
+    const FileEntries early{found_early, {}, true, since()};
+    const std::string sound = sound_of(early);
+    own.show(file, early);
+    own.publish(on_change, told ? std::string() : sound);
+    told = true;
+  };
 
   // Sensor limits want the cloud, which the scan half lets go.
-  std::vector<io::ScanFile> outlines;
+  std::vector<std::vector<Eigen::Vector3f>> outlines;
   if (input.scans) {
-    for (const io::ScanFile& scan : *input.scans) outlines.push_back(thinned(scan, 4000));
+    for (const io::ScanFile& scan : *input.scans) outlines.push_back(outline_of(scan.cloud));
   }
   std::optional<io::RunRecord> made;
   const auto detect_alone = [&]() -> Result<void> {
@@ -195,7 +186,7 @@ Result<void> LiveSession::add(const std::string& path) {
       entry.posed = own.posed(entry.record, folder / io::segment_file(i, entry.record.name));
       group.entries.push_back(std::move(entry));
     }
-    group.limits = limits_of(outlines, group.entries);
+    group.limits = limits_of(outlines, group.entries, own.model.prepared);
     return own.store->commit(file, *made, group.limits);
   };
   if (auto taken = take_in(); !taken) {
@@ -222,7 +213,7 @@ Result<void> LiveSession::add(const std::string& path) {
   const SensorLimits before = own.planner->limits();
   own.learn_sensor();
   if (!(own.planner->limits() == before)) own.publish(on_change);
-  return {};
+  return own.add_former_copy_of(file, *this);
 }
 
 }  // namespace asbuilt::live

@@ -26,7 +26,7 @@ constexpr double kLiftOff = 1e-5;          // of the diameter: far above float r
 constexpr int kEvenRays = 192;             // of a hidden spot and side, even over the hemisphere
 constexpr double kEvenShare = 1.0 / 30.0;  // of what the threshold asks: at 0.97 a thousandth of the hemisphere
 constexpr int kCoverRays = 16;             // of a hidden spot and side, to learn which body hides it
-constexpr double kMostEdge = 0.015;        // of the diameter: longer edges of partly covered faces are halved
+constexpr double kMostEdge = 0.015;        // of the diameter: longer edges of partly hidden faces are halved
 constexpr int kMostRounds = 10;            // a thousandth of the longest edge there can be
 constexpr double kGolden1 = 0.7548776662466927, kGolden2 = 0.5698402909980532;  // plastic number: an even sequence
 
@@ -126,7 +126,7 @@ class Prober {
     const int spots = static_cast<int>(std::clamp(std::ceil(spots_across), 1.0, static_cast<double>(kMaxSpots)));
     const EvenSquare spot_at(random);
     Tally front, back;
-    int probed = 0, covered = 0;
+    int probed = 0, hidden = 0, covered = 0;
     bool is_visible = false, is_dim = true;
     for (; probed < spots || (!is_visible && probed < kFewestSpots); ++probed) {
       const Eigen::Vector3d spot =
@@ -138,10 +138,11 @@ class Prober {
       if (!is_visible) front += here_front, back += here_back;
       is_visible = is_visible || sees;
       is_dim = is_dim && !is_plain;
+      hidden += sees ? 0 : 1;
       covered += !sees && is_covered(face, spot, square, body) ? 1 : 0;
     }
-    return {front.share(), back.share(), static_cast<float>(covered) / static_cast<float>(probed), is_visible,
-            is_visible && is_dim};
+    const auto share = [&](int count) { return static_cast<float>(count) / static_cast<float>(probed); };
+    return {front.share(), back.share(), share(hidden), share(covered), is_visible, is_visible && is_dim};
   }
 
  private:
@@ -220,15 +221,15 @@ std::vector<FaceVisibility> face_visibility(const TriangleMesh& mesh, const RayS
   return probe_all(mesh, Prober(mesh, rays_against, options), context);
 }
 
-SeenMesh split_where_covered(const TriangleMesh& mesh, const RayScene& rays_against, const VisibilityOptions& options,
-                             const Context& context) {
+SeenMesh split_where_hidden(const TriangleMesh& mesh, const RayScene& rays_against, const VisibilityOptions& options,
+                            const Context& context) {
   const Prober prober(mesh, rays_against, options);
   SeenMesh seen{mesh, probe_all(mesh, prober, context)};
   std::vector<int> bodies = prober.bodies();
   for (int round = 0; round < kMostRounds && !context.cancelled(); ++round) {
     std::vector<std::uint8_t> chosen(seen.visibility.size());
     for (std::size_t i = 0; i < chosen.size(); ++i) {
-      chosen[i] = seen.visibility[i].is_visible && seen.visibility[i].covered > 0.0F ? 1 : 0;
+      chosen[i] = seen.visibility[i].is_visible && seen.visibility[i].hidden > 0.0F ? 1 : 0;
     }
     SplitMesh split = split_long_edges(seen.mesh, chosen, prober.most_edge_mm());
     if (split.mesh.triangles.size() == seen.mesh.triangles.size()) break;
@@ -240,9 +241,7 @@ SeenMesh split_where_covered(const TriangleMesh& mesh, const RayScene& rays_agai
       bodies_of_pieces[i] = bodies[parent];
       visibility[i] = seen.visibility[parent];
       if (chosen[parent] == 0 || context.cancelled()) return;
-      FaceVisibility& piece = visibility[i];
-      piece = prober.probe(Face(split.mesh, i), bodies[parent], Random(1, "ambient occlusion", i));
-      if (!piece.is_visible && piece.covered < 0.5F) piece.is_visible = piece.is_dim = true;
+      visibility[i] = prober.probe(Face(split.mesh, i), bodies[parent], Random(1, "ambient occlusion", i));
     });
     seen = {std::move(split.mesh), std::move(visibility)};
     bodies = std::move(bodies_of_pieces);

@@ -12,7 +12,8 @@ namespace asbuilt::model {
 /// How much of the far world a face sees from either side: 1 minus its ambient occlusion.
 struct FaceVisibility {
   float front = 0.0F, back = 0.0F;  ///< share of the rays that escape; front is the side of the winding's normal
-  float covered = 0.0F;             ///< share of its spots that see nothing since another body lies over them
+  float hidden = 0.0F;              ///< share of its spots that see nothing
+  float covered = 0.0F;             ///< the part of `hidden` over which another body lies
   bool is_visible = false;          ///< some spot of the face sees out from one of its sides
   bool is_dim = false;              ///< visible, but every spot lies above the threshold
 };
@@ -34,10 +35,9 @@ struct SeenMesh {
   std::vector<FaceVisibility> visibility;
 };
 
-/// As face_visibility, but visible faces that another body covers in part (a plate under a foot) are split first, down
-/// to edges of 1.5 % of the diameter, so that what is covered can be told from what is seen. What a body hides of a
-/// split face by its own shape (the depth of a bore) counts as visible: without it the skin would be open.
-[[nodiscard]] SeenMesh split_where_covered(const TriangleMesh& mesh, const RayScene& rays_against,
-                                           const VisibilityOptions& options, const Context& context);
+/// As face_visibility, but visible faces of which a part sees nothing (a plate under a foot, a wall that another meets)
+/// are split first, down to edges of 1.5 % of the diameter, so that what is hidden can be told from what is seen.
+[[nodiscard]] SeenMesh split_where_hidden(const TriangleMesh& mesh, const RayScene& rays_against,
+                                          const VisibilityOptions& options, const Context& context);
 
 }  // namespace asbuilt::model

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kPinhole = 0.02;         // of the diameter: hidden spots smaller than its square stay
 constexpr double kBoreShare = 0.001;      // what the bottom of a hole sees that is sixteen times as deep as wide
+constexpr float kCovered = 0.5F;          // of its spots, from which on a face counts as covered by another body
 constexpr double kOpenShellShare = 0.35;  // a bowl's inside sees half of what its outside sees; a closed part's nothing
 constexpr double kClearMajority = 0.6;    // of a patch's area, to believe the file's winding on an open shell
 
@@ -30,16 +31,18 @@ struct HiddenGroup {
 
 // What hides next to plainly visible faces stays if it is a pinhole or sees a little on the whole: the walls of a bore,
 // the bottom of a groove. A scanner may well catch some of it, and without it the skin would be open and the distance
-// lose its sign. `keep` comes with the plainly visible faces.
+// lose its sign. What another body covers is no part of that: it may hang together with what is seen (a sleeve in a
+// housing of which the rim is in sight), but it lies inside. `keep` comes with the plainly visible faces.
 void keep_bores_and_pinholes(const TriangleMesh& mesh, const std::vector<FaceVisibility>& visibility,
                              std::vector<std::uint8_t>& keep) {
   const std::vector<EdgeSide> sides = sorted_sides(mesh);
   const auto is_kept = [&](const EdgeSide& side) { return keep[side.triangle] != 0; };
   DisjointSets linked(static_cast<int>(mesh.triangles.size()));
+  const auto is_candidate = [&](std::size_t i) { return keep[i] == 0 && visibility[i].covered < kCovered; };
   for_each_edge(sides, [&](std::span<const EdgeSide> faces) {
     const EdgeSide* previous = nullptr;
     for (const EdgeSide& side : faces) {
-      if (is_kept(side)) continue;
+      if (!is_candidate(side.triangle)) continue;
       if (previous != nullptr) linked.unite(static_cast<int>(previous->triangle), static_cast<int>(side.triangle));
       previous = &side;
     }
@@ -49,19 +52,19 @@ void keep_bores_and_pinholes(const TriangleMesh& mesh, const std::vector<FaceVis
     return groups[static_cast<std::size_t>(linked.find(static_cast<int>(i)))];
   };
   for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i] != 0) continue;
+    if (!is_candidate(i)) continue;
     group_of(i).area += area_of(mesh, i);
     group_of(i).seen_area += area_of(mesh, i) * static_cast<double>(std::max(visibility[i].front, visibility[i].back));
   }
   for_each_edge(sides, [&](std::span<const EdgeSide> faces) {
     if (std::ranges::none_of(faces, is_kept)) return;
     for (const EdgeSide& side : faces) {
-      if (!is_kept(side)) group_of(side.triangle).touches_visible = true;
+      if (is_candidate(side.triangle)) group_of(side.triangle).touches_visible = true;
     }
   });
   const double pinhole = std::pow(kPinhole * diameter(mesh), 2);
   for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i] != 0) continue;
+    if (!is_candidate(i)) continue;
     const HiddenGroup& group = group_of(i);
     const bool is_small = group.area < pinhole, sees_a_little = group.seen_area >= kBoreShare * group.area;
     if (group.touches_visible && (is_small || sees_a_little)) keep[i] = 1;

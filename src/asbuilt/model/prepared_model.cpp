@@ -136,7 +136,7 @@ Result<PreparedModel> prepare(const TriangleMesh& mesh, const ModelOptions& opti
   const VisibilityOptions looking{options.occlusion_threshold, options.occlusion_rays};
   const SeenMesh seen = options.keep_inner
                             ? SeenMesh{clean_mesh.mesh, face_visibility(clean_mesh.mesh, rays, looking, context)}
-                            : split_where_covered(clean_mesh.mesh, rays, looking, context);
+                            : split_where_hidden(clean_mesh.mesh, rays, looking, context);
   if (context.cancelled()) return cancelled();
   context.report_progress(0.4);
 

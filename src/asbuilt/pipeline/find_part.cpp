@@ -37,13 +37,13 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
                             const Context& context) {
   ASBUILT_CHECK(options.detect.validate());
   ASBUILT_CHECK(options.verify.validate());
-  detect::SampledScan sampled;
+  FoundPart found;
+  detect::SampledScan& sampled = found.sampled;
   std::optional<detect::HypothesisSearch> search;
   timed("detect", [&] {
     sampled = detect::sampled_scan(scan, model.sampling_distance, model.diameter, context);
     search.emplace(scan, sampled, codebook, options.detect);
   });
-  FoundPart found;
   const auto propose = [&](int reference_points, double most_votes, int most_hypotheses) {
     Result<void> voted;
     timed("detect", [&] {

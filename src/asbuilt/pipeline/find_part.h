@@ -18,6 +18,7 @@ namespace asbuilt::pipeline {
 struct FoundPart {
   std::vector<verify::Detection> placements;   ///< one, or with `Instances::all` all of them; one that says why if none
   std::vector<detect::Hypothesis> hypotheses;  ///< that the last look verified, starts of the user among them
+  detect::SampledScan sampled;                 ///< the scan as detection looked at it
   std::uint64_t votes_cast = 0;                ///< over all looks
   int looks = 0;                               ///< 1: the first one was enough
 };

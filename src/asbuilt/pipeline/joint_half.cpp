@@ -70,14 +70,13 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
                     io::RunRecord& record, const Context& context) {
   constexpr int kMostRounds = 3;
   std::vector<PosedScan>& scans = registration.scans;
-  if (!options.paper_mode) ASBUILT_CHECK(start_near_model(scans, model, context));
+  if (!options.paper_mode) ASBUILT_CHECK(start_as_detected(scans, model, context));
   ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
   registration.graph = std::move(first_graph);
   bool placements_chosen = options.paper_mode;
   const auto begin_again = [&]() -> Result<void> {
     restore_seen_through(scans);
-    for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local_detected;
-    ASBUILT_CHECK(start_near_model(scans, model, context));
+    ASBUILT_CHECK(start_as_detected(scans, model, context));
     ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
     registration.graph = std::move(graph);
     return {};

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 
+#include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/pipeline/closer_look.h"
 #include "asbuilt/pipeline/find_part.h"
+#include "asbuilt/pipeline/search_points.h"
 #include "asbuilt/pipeline/unit_check.h"
 #include "asbuilt/verify/instances.h"
 #include "asbuilt/verify/verify.h"
@@ -39,6 +41,29 @@ Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, cons
   auto scan = scan::prepare_scan(file.cloud, file_viewpoint, request, half.options.scan, context);
   if (scan || scan.error().code == ErrorCode::cancelled) return scan;
   return fail(scan.error().code, fmt::format("{}: {}", file.path.string(), scan.error().message));
+}
+
+/// The points in which the part is sought, where there are far more than that takes; without what only measuring needs.
+std::optional<io::ScanFile> thinned_for_search(const io::ScanFile& file, const ScanHalf& half, const Context& context) {
+  const auto staying = search_points(file.cloud.positions, half.model.prepared, half.options.detect, context);
+  if (!staying) return std::nullopt;
+  io::ScanFile thin;
+  thin.path = file.path;
+  thin.name = file.name;
+  thin.offset_mm = file.offset_mm;
+  thin.viewpoint_mm = file.viewpoint_mm;
+  thin.unit = file.unit;
+  for (const std::uint32_t i : *staying) {
+    thin.cloud.positions.push_back(file.cloud.positions[i]);
+    if (file.cloud.has_normals()) thin.cloud.normals.push_back(file.cloud.normals[i]);
+  }
+  return thin;
+}
+
+double spacing_of_all(const PointCloud& cloud, const Context& context) {
+  std::vector<Eigen::Vector3f> measured;
+  std::ranges::copy_if(cloud.positions, std::back_inserter(measured), is_measured);
+  return median_spacing(measured, KdTree(measured, context));
 }
 
 void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::ScanFile& file) {
@@ -159,6 +184,38 @@ Result<verify::Detection> accept_for_user(const verify::Detection& detection, in
   return std::move(accepted);
 }
 
+/// Puts the candidates that --accept names in the place of what was found.
+Result<void> take_acceptances(std::vector<verify::Detection>& placements, const scan::Scan& scan,
+                              const io::ScanFile& file, const ScanHalf& half, const Context& context) {
+  ASBUILT_CHECK(check_acceptances(file, placements.size(), half.options));
+  bool chosen_by_user = false;
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const auto candidate = accepted_candidate(file, i + 1, half.options);
+    if (!candidate) continue;
+    ASBUILT_TRY(accepted, accept_for_user(placements[i], *candidate, scan, file, half, context));
+    placements[i] = std::move(accepted);
+    chosen_by_user = true;
+  }
+  if (chosen_by_user) verify::separate_segments(placements, scan, half.model.prepared, context);
+  return {};
+}
+
+/// One entry for each placement, with its points of the scan out of which it was cut.
+std::vector<JudgedScan> entries_of(const io::ScanRecord& of_scan, const std::vector<verify::Detection>& placements,
+                                   const scan::Scan& scan, const io::ScanFile& file, const ScanHalf& half) {
+  std::vector<JudgedScan> entries;
+  for (const verify::Detection& detection : placements) {
+    JudgedScan entry{of_scan, {}};
+    entry.record.instance = static_cast<int>(entries.size()) + 1;
+    entry.record.instances_in_scan = static_cast<int>(placements.size());
+    describe_detection(entry.record, detection);
+    if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
+    if (!detection.segment.empty()) entry.segment = cut_out(scan, file, detection, half.model.prepared);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
 }  // namespace
 
 Options with_units_read(const ScanHalf& half, const io::ScanFile& file) {
@@ -170,19 +227,24 @@ Options with_units_read(const ScanHalf& half, const io::ScanFile& file) {
 
 Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanHalf& half, RunFolder& folder,
                                            const Context& context) {
-  JudgedScan judged;
+  io::ScanRecord record;
+  std::optional<io::ScanFile> thin;
   Result<scan::Scan> scan;
   {
     const auto timed = folder.stage("prepare_scan", file.name);
-    scan = prepared(file, half, context);
+    thin = thinned_for_search(file, half, context);
+    scan = prepared(thin ? *thin : file, half, context);
   }
   if (!scan) return tl::unexpected(scan.error());
-  describe_scan(judged.record, *scan, file);
+  describe_scan(record, *scan, file);
+  if (!file.thinning && thin) {
+    record.points = static_cast<std::size_t>(std::ranges::count_if(file.cloud.positions, is_measured));
+  }
   if (const auto contradiction = size_contradiction(*scan, half.model.prepared, with_units_read(half, file))) {
-    judged.record.status = io::ScanStatus::rejected;
-    judged.record.reason_code = verify::code_of(verify::Reason::scan_too_small);
-    judged.record.reason = *contradiction;
-    return std::vector<JudgedScan>{std::move(judged)};
+    record.status = io::ScanStatus::rejected;
+    record.reason_code = verify::code_of(verify::Reason::scan_too_small);
+    record.reason = *contradiction;
+    return std::vector<JudgedScan>{{std::move(record), {}}};
   }
 
   const TimedStage timed = [&](std::string_view stage, const std::function<void()>& work) {
@@ -191,51 +253,34 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
   };
   ASBUILT_TRY(found, find_part(*scan, half.model.prepared, half.codebook, starts_for(file, half.starts), half.options,
                                timed, context));
-  std::vector<verify::Detection>& placements = found.placements;
-  ASBUILT_CHECK(check_acceptances(file, placements.size(), half.options));
-  bool chosen_by_user = false;
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const auto candidate = accepted_candidate(file, i + 1, half.options);
-    if (!candidate) continue;
-    ASBUILT_TRY(accepted, accept_for_user(placements[i], *candidate, *scan, file, half, context));
-    placements[i] = std::move(accepted);
-    chosen_by_user = true;
-  }
-  if (chosen_by_user) verify::separate_segments(placements, *scan, half.model.prepared, context);
-  std::optional<CloserLook> closer;
+  ASBUILT_CHECK(take_acceptances(found.placements, *scan, file, half, context));
   const bool is_found =
-      std::ranges::any_of(placements, [](const auto& placement) { return !placement.segment.empty(); });
-  if (file.thinning && is_found) {
-    const auto taken = folder.stage("look_closer", file.name);
-    const scan::Viewpoint viewpoint = scan->viewpoint;
-    *scan = {};  // the memory is wanted for the closer look
-    ASBUILT_TRY(looked, look_closer(file, viewpoint, std::move(placements), half.model, half.options, context));
-    closer = std::move(looked);
-    placements = std::move(closer->placements);
-    if (closer->file.thinning) {
-      judged.record.warnings.push_back(
-          fmt::format("Even around the part there are more points than fit: one in each cube of {:.3g} mm was "
-                      "measured; raise --memory "
-                      "to measure all.",
-                      closer->file.thinning->spacing_mm));
-    }
-    judged.record.noise_sigma = closer->scan.noise_sigma_mm;
-    judged.record.spacing = closer->scan.spacing_mm;
-    judged.record.normals_oriented = closer->scan.normals_oriented;
+      std::ranges::any_of(found.placements, [](const auto& placement) { return !placement.segment.empty(); });
+  const bool is_thinned = thin || file.thinning;
+  if (thin && !is_found) record.spacing = spacing_of_all(file.cloud, context);  // a closer look would have told
+  if (!is_thinned || !is_found) return entries_of(record, found.placements, *scan, thin ? *thin : file, half);
+
+  if (half.early_verdict) {
+    half.early_verdict(file, entries_of(record, found.placements, *scan, thin ? *thin : file, half));
   }
-  const scan::Scan& cut_from = closer ? closer->scan : *scan;
-  const io::ScanFile& cut_from_file = closer ? closer->file : file;
-  std::vector<JudgedScan> entries;
-  for (const verify::Detection& detection : placements) {
-    JudgedScan entry = judged;
-    entry.record.instance = static_cast<int>(entries.size()) + 1;
-    entry.record.instances_in_scan = static_cast<int>(placements.size());
-    describe_detection(entry.record, detection);
-    if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
-    if (!detection.segment.empty()) entry.segment = cut_out(cut_from, cut_from_file, detection, half.model.prepared);
-    entries.push_back(std::move(entry));
+  const auto taken = folder.stage("look_closer", file.name);
+  const double sought_spacing_mm =
+      thin ? half.options.detect.search_spacing_ratio * half.model.prepared.sampling_distance
+           : file.thinning->spacing_mm;
+  const ThinnedSearch search{file, sought_spacing_mm, thin.has_value(), scan->viewpoint, found.sampled};
+  *scan = {};  // the memory is wanted for the closer look
+  thin.reset();
+  ASBUILT_TRY(closer, look_closer(search, std::move(found.placements), half.model, half.options, context));
+  if (closer.file.thinning) {
+    record.warnings.push_back(
+        fmt::format("Even around the part there are more points than fit: one in each cube of {:.3g} mm was "
+                    "measured; raise --memory to measure all.",
+                    closer.file.thinning->spacing_mm));
   }
-  return entries;
+  record.noise_sigma = closer.scan.noise_sigma_mm;
+  record.spacing = closer.scan.spacing_mm;
+  record.normals_oriented = closer.scan.normals_oriented;
+  return entries_of(record, closer.placements, closer.scan, closer.file, half);
 }
 
 }  // namespace asbuilt::pipeline

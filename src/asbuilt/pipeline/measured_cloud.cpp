@@ -26,7 +26,7 @@ bool has_faces(const std::string& path, std::string_view content) {
 /// The points of all scans in a file, sanitised. A file of one scan whose rows were all read may say more of each.
 Result<void> read_points(const std::string& path, std::string_view content, const Options& options,
                          const Context& context, MeasuredCloud& measured) {
-  const io::ReadOptions reading = scan_reading(options, path);
+  const io::ReadOptions reading = scan_reading(options, path, context);
   ASBUILT_TRY(files, io::scans_in(path, content, reading));
   PointCloud& all = measured.cloud;
   for (const io::ScanFile& file : files) {

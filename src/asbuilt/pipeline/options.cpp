@@ -99,7 +99,7 @@ Result<void> Options::validate() const {
   return {};
 }
 
-io::ReadOptions scan_reading(const Options& options, const std::string& path) {
+io::ReadOptions scan_reading(const Options& options, const std::string& path, const Context& context) {
   io::ReadOptions reading = options.scan_unit;
   const std::string name = std::filesystem::path(path).stem().string();
   for (const std::string& text : options.scan_units) {
@@ -108,6 +108,7 @@ io::ReadOptions scan_reading(const Options& options, const std::string& path) {
   }
   reading.columns = options.columns;
   reading.camera = options.camera;
+  reading.context = context;
   return reading;
 }
 

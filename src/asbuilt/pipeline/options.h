@@ -95,7 +95,7 @@ void for_each_stage_field(Options& options, Visitor&& field) {
 }
 
 /// How the scans of a file and models are read.
-[[nodiscard]] io::ReadOptions scan_reading(const Options& options, const std::string& path);
+[[nodiscard]] io::ReadOptions scan_reading(const Options& options, const std::string& path, const Context& context);
 [[nodiscard]] io::ModelReadOptions model_reading(const Options& options);
 
 /// The options with paper mode handed down to every stage.

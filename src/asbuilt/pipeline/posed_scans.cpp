@@ -99,9 +99,9 @@ Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, con
   return scans;
 }
 
-Result<void> start_near_model(std::vector<PosedScan>& scans, const LoadedModel& model, const Context& context) {
+Result<void> start_as_detected(std::vector<PosedScan>& scans, const LoadedModel& model, const Context& context) {
   for (PosedScan& scan : scans) {
-    const refine::View view{scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint};
+    const refine::View view{scan.part, scan.model_from_local_detected, scan.noise_sigma_mm, scan.viewpoint};
     ASBUILT_TRY(start, refine::start_near_model(view, *model.prepared.surface, model.prepared.diameter, context));
     scan.model_from_local_start = start;
   }

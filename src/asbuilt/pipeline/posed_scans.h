@@ -65,9 +65,10 @@ struct Contradiction {
 /// The parts of all accepted scans, read from the folder's segments.
 [[nodiscard]] Result<std::vector<PosedScan>> load_posed_scans(const io::RunRecord& record, const RunFolder& folder);
 
-/// Fits starts to the CAD that lie off it (refine::start_near_model); the others stay as they are.
-[[nodiscard]] Result<void> start_near_model(std::vector<PosedScan>& scans, const LoadedModel& model,
-                                            const Context& context);
+/// Lets the next refinement start from the detected poses; those that lie off the CAD are fitted to it first
+/// (refine::start_near_model).
+[[nodiscard]] Result<void> start_as_detected(std::vector<PosedScan>& scans, const LoadedModel& model,
+                                             const Context& context);
 
 /// The graph under the starting poses, without links between different individuals.
 [[nodiscard]] Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedModel& model,

@@ -279,7 +279,7 @@ double spacing_of_found(const io::RunRecord& record) {
 InputFile read_input(const std::string& path, const Options& options, const Context& context) {
   const auto content = io::FileContent::open(path);
   if (!content) return {path, "", tl::unexpected(content.error())};
-  io::ReadOptions reading = scan_reading(options, path);
+  io::ReadOptions reading = scan_reading(options, path, context);
   reading.sieve = sieve_for(path, MemoryBudget(options.memory_gb), context);
   InputFile input{path, io::sha256(content->view()), io::scans_in(path, content->view(), reading)};
   if (const auto whole = content->whole(); !whole) input.scans = tl::unexpected(whole.error());
@@ -327,7 +327,7 @@ void look_for_mistaken_unit(io::RunRecord& record, const ScanHalf& half, RunFold
     if (scan.reason_code == "scan_too_small" || scan.reason_code == "wrong_unit") continue;
     if (tried++ == kScansTriedWithOtherUnits || context.cancelled()) return;
     const auto timed = folder.stage("try_units", scan.name);
-    io::ReadOptions reading = scan_reading(half.options, scan.path);
+    io::ReadOptions reading = scan_reading(half.options, scan.path, context);
     const auto sieve = sieve_for(scan.path, MemoryBudget(half.options.memory_gb), context);
     sieve->announced = {};  // said when it was read first
     reading.sieve = sieve;

@@ -29,15 +29,23 @@ constexpr double kUnheld = 5e-4;      // information below this share of a full 
 constexpr double kStillRatio = 1e-7;  // of the diameter: a step this small ends the search
 constexpr int kMaxSteps = 60;
 
+// Even over a view, moved by a pose.
+PointCloud sampled_at(const View& view, const Pose& moved_from_scan, std::size_t most, const Context& context) {
+  PointCloud points = evenly_sampled(view.segment_in_scan, most, context);
+  for (Eigen::Vector3f& point : points.positions) point = (moved_from_scan * point.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& normal : points.normals) {
+    normal = (moved_from_scan.linear() * normal.cast<double>()).cast<float>();
+  }
+  return points;
+}
+
 // Even over the union of all views, in the refined frame.
 PointCloud even_union(std::span<const View> views, std::span<const Pose> refined_from_scan, const Context& context) {
   PointCloud all;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const PointCloud sample = evenly_sampled(views[v].segment_in_scan, kPointsPerView, context);
-    for (std::size_t i = 0; i < sample.size(); ++i) {
-      all.positions.push_back((refined_from_scan[v] * sample.positions[i].cast<double>()).cast<float>());
-      all.normals.push_back((refined_from_scan[v].linear() * sample.normals[i].cast<double>()).cast<float>());
-    }
+    const PointCloud sample = sampled_at(views[v], refined_from_scan[v], kPointsPerView, context);
+    all.positions.insert(all.positions.end(), sample.positions.begin(), sample.positions.end());
+    all.normals.insert(all.normals.end(), sample.normals.begin(), sample.normals.end());
   }
   return evenly_sampled(all, kPoints, context);
 }
@@ -225,11 +233,7 @@ Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& su
     return fail(ErrorCode::invalid_argument, "the view has not one normal a point");
   }
   if (view.segment_in_scan.empty()) return view.model_from_scan;
-  PointCloud points = evenly_sampled(view.segment_in_scan, kRoughPoints, context);
-  for (Eigen::Vector3f& point : points.positions) point = (view.model_from_scan * point.cast<double>()).cast<float>();
-  for (Eigen::Vector3f& normal : points.normals) {
-    normal = (view.model_from_scan.linear() * normal.cast<double>()).cast<float>();
-  }
+  const PointCloud points = sampled_at(view, view.model_from_scan, kRoughPoints, context);
   GaugeFit fit(points, surface, diameter_mm, kRoughReachRatio, context);
   const double before = fit.share_off(Pose::Identity());
   if (before <= kRoughShare) return view.model_from_scan;

@@ -10,11 +10,15 @@
 namespace asbuilt::report {
 namespace {
 
+/// Behind the point, for three significant digits.
+int decimals_of(double value) {
+  return value == 0.0 ? 3 : std::clamp(2 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
+}
+
 /// Three significant digits, plain notation.
 std::string plain(double value) {
   if (value == 0.0) return "0";
-  const int digits = std::clamp(2 - static_cast<int>(std::floor(std::log10(std::abs(value)))), 0, 6);
-  return fmt::format("{:.{}f}", value, digits);
+  return fmt::format("{:.{}f}", value, decimals_of(value));
 }
 
 std::string range_of(const inspect::Tolerance& tolerance) {
@@ -114,7 +118,7 @@ std::string alignment_detail(const ReportInput& input) {
 
 std::string verdict_reason(const ReportInput& input) {
   const inspect::DeviationReport& deviations = input.deviations;
-  if (!deviations.verdict) return "no tolerance was given";
+  if (!deviations.verdict) return "limits stated with --tolerance would give a verdict";
   switch (*deviations.verdict) {
     case inspect::Verdict::fail: {
       const inspect::SurfacePart* part = worst_failure(deviations);
@@ -158,9 +162,11 @@ std::string summary_of(const ReportInput& input) {
     }
   }
   if (deviations.over_area.count == 0) return text + "No point lies on the surface.";
-  return text + fmt::format("{} of the surface was scanned; its mean deviation is {} mm, the standard deviation {} mm.",
-                            percent(deviations.coverage), signed_mm(deviations.over_area.mean),
-                            plain(deviations.over_area.sigma));
+  const double mean = deviations.over_area.mean, sigma = deviations.over_area.sigma;
+  return text +
+         fmt::format("{} of the surface was scanned; its mean deviation is {}{} mm, the standard deviation {} mm.",
+                     percent(deviations.coverage), mean < 0.0 ? "\u2212" : "+",
+                     fmt::format("{:.{}f}", std::abs(mean), decimals_of(sigma)), plain(sigma));
 }
 
 }  // namespace asbuilt::report

@@ -32,10 +32,10 @@ Json verdict_json(const ReportInput& input) {
 Json notes_json(const ReportInput& input) {
   Json notes = Json::array();
   if (input.model.is_open()) {
-    notes.push_back(
-        fmt::format("the model is open: {} edges have one face only, and the sign of {} points nearest to them "
-                    "has no meaning",
-                    input.model.report.open_edges, input.deviations.on_open_edges));
+    notes.push_back(fmt::format(
+        "the model is open: {} edges have one face only, and next to them the sign has no meaning ({} "
+        "measured point{})",
+        input.model.report.open_edges, input.deviations.on_open_edges, input.deviations.on_open_edges == 1 ? "" : "s"));
   }
   if (input.deviations.far_points > 0) {
     notes.push_back(fmt::format("{} points lie further than {:.3g} mm from the surface and enter no figure",

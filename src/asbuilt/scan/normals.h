@@ -19,13 +19,14 @@ struct PlaneFit {
 [[nodiscard]] PlaneFit fit_plane(std::span<const Eigen::Vector3f> points,
                                  std::span<const KdTree::Neighbour> neighbours);
 
-/// Plane fits over the `count` nearest neighbours of each point; the normals' signs mean nothing.
+/// Plane fits over the `count` nearest neighbours of each point; the normals' signs mean nothing. `spacing_mm` is about
+/// that of the points: it tells what is gathered together, not what is found.
 struct FittedNormals {
   std::vector<Eigen::Vector3f> normals;
   std::vector<float> variation;
 };
 [[nodiscard]] FittedNormals fitted_normals(std::span<const Eigen::Vector3f> points, const KdTree& tree,
-                                           std::size_t count, const Context& context);
+                                           double spacing_mm, std::size_t count, const Context& context);
 
 /// Sensor noise, 1 sigma in mm: the median over probes of the residual of a local quadric, which curvature does not
 /// inflate as it would a plane's. From at most `max_probes` neighbourhoods.

@@ -77,16 +77,17 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.cloud.positions = std::move(clean.cloud.positions);
   const std::vector<Eigen::Vector3f> file_normals = std::move(clean.cloud.normals);
 
-  const KdTree tree(scan.cloud.positions);
+  const KdTree tree(scan.cloud.positions, context);
   scan.spacing_mm = median_spacing(scan.cloud.positions, tree);
   scan.noise_sigma_mm =
       options.noise_sigma_mm > 0.0 ? options.noise_sigma_mm : estimate_noise(scan.cloud.positions, tree, context);
-  FittedNormals fitted =
-      fitted_normals(scan.cloud.positions, tree, neighbours_for_normals(scan.noise_sigma_mm, scan.spacing_mm), context);
+  FittedNormals fitted = fitted_normals(scan.cloud.positions, tree, scan.spacing_mm,
+                                        neighbours_for_normals(scan.noise_sigma_mm, scan.spacing_mm), context);
   scan.cloud.normals = std::move(fitted.normals);
   scan.surface_variation = std::move(fitted.variation);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
   scan.viewpoint = choose_viewpoint(scan, file_normals, file_viewpoint, request, scan.warnings);
+  scan.spacing_by_range = SpacingByRange(scan.cloud.positions, tree, scan.viewpoint);
   scan.normals_oriented = orient_normals(scan, file_normals, options.use_file_normals, context);
   return scan;
 }
@@ -103,7 +104,7 @@ PointCloud downsample(const Scan& scan, double spacing_mm, double normal_radius_
   } else {
     source = positions;
   }
-  const KdTree tree(source);
+  const KdTree tree(source, context);
 
   PointCloud samples;
   samples.positions.resize(chosen.size());

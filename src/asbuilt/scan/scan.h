@@ -10,6 +10,7 @@
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/result.h"
 #include "asbuilt/scan/sanitise.h"
+#include "asbuilt/scan/spacing_by_range.h"
 #include "asbuilt/scan/viewpoint.h"
 
 namespace asbuilt::scan {
@@ -36,9 +37,15 @@ struct Scan {
   Viewpoint viewpoint;
   bool normals_oriented = false;  ///< whether the sign of the normals means anything
   double spacing_mm = 0.0;        ///< median distance between neighbours
+  SpacingByRange spacing_by_range;
   double noise_sigma_mm = 0.0;
   SanitiserReport report;
   std::vector<std::string> warnings;
+
+  /// Distance between neighbouring measurements at a place, mm; the median where nothing is known of its change.
+  [[nodiscard]] double spacing_at(const Eigen::Vector3d& point_in_scan) const {
+    return spacing_by_range.known() ? spacing_by_range.at(point_in_scan) : spacing_mm;
+  }
 };
 
 /// Sanitises, fits normals, decides the viewpoint, estimates the noise.

@@ -14,14 +14,15 @@ constexpr double kClearlyNearer = 0.5;  // of the distance that counts as on the
 
 class Contrast {
  public:
-  Contrast(const model::PreparedModel& model, const ScanEvidence& scan, const EvidenceOptions& options)
+  Contrast(const model::PreparedModel& model, const ScanEvidence& scan, double spacing_mm,
+           const EvidenceOptions& options)
       : model_(model), scan_(scan), options_(options) {
     // Of samples much denser than the measurements a part is as telling as all of them: they are in an order in which
     // any first few are spread out.
     constexpr double kSamplesPerMeasurement = 3.0;
     constexpr std::size_t kFewest = 5000;
     const std::size_t all = model.dense_samples.size();
-    weight_ = measurements_per_sample(model, scan.scan);
+    weight_ = measurements_per_sample(model, spacing_mm);
     asked_ = std::clamp(static_cast<std::size_t>(kSamplesPerMeasurement * weight_ * static_cast<double>(all)),
                         std::min(kFewest, all), all);
     asked_ = std::min(asked_, options.most_samples);
@@ -76,7 +77,7 @@ class Contrast {
   // 1 for the pose that puts a sample here, -1 for the other, 0 if the scan does not tell.
   [[nodiscard]] double verdict_on(const Eigen::Vector3d& point_in_scan, double cosine, const Pose& own_from_scan,
                                   const Pose& other_from_scan) const {
-    const double reach = std::hypot(options_.distance_mm, options_.lateral_mm);
+    const double reach = std::hypot(options_.distance_mm, lateral_at(options_, cosine));
     const KdTree::Neighbour nearest =
         scan_.foreground_tree.nearest(point_in_scan.cast<float>(), static_cast<float>(reach));
     if (nearest.found()) {
@@ -102,14 +103,16 @@ class Contrast {
 
 }  // namespace
 
-double measurements_per_sample(const model::PreparedModel& model, const scan::Scan& scan) {
-  const double square_mm2 = scan.spacing_mm * scan.spacing_mm;
+double measurements_per_sample(const model::PreparedModel& model, double spacing_mm) {
+  const double square_mm2 = spacing_mm * spacing_mm;
   return square_mm2 > 0.0 ? std::min(1.0, model.dense_sample_area_mm2 / square_mm2) : 1.0;
 }
 
 PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan, const model::PreparedModel& model,
                       const ScanEvidence& scan, const EvidenceOptions& options) {
-  const Contrast asked(model, scan, options);
+  const double spacing_mm =
+      0.5 * (spacing_at(first_from_scan, model, scan.scan) + spacing_at(second_from_scan, model, scan.scan));
+  const Contrast asked(model, scan, spacing_mm, options);
   PoseContrast result;
   asked.add(first_from_scan, second_from_scan, result.for_first, result.for_second);
   asked.add(second_from_scan, first_from_scan, result.for_second, result.for_first);

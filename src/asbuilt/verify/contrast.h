@@ -14,15 +14,17 @@ struct PoseContrast {
   [[nodiscard]] double total() const { return for_first + for_second; }
 };
 
-/// What one of the model's dense samples counts for: samples closer than the scan's points are not independent.
-[[nodiscard]] double measurements_per_sample(const model::PreparedModel& model, const scan::Scan& scan);
+/// What one of the model's dense samples counts for: samples closer than the scan's points, `spacing_mm` apart, are not
+/// independent.
+[[nodiscard]] double measurements_per_sample(const model::PreparedModel& model, double spacing_mm);
 
 /// Compares two poses by the samples of the model that only one of them puts where they are: a hole that one claims and
 /// the other does not. Everything that both predict says nothing about which is right, and would drown the rest.
 ///
 /// Such a sample speaks for its pose if the nearest scan point lies on the model at this pose and clearly less so at
 /// the other; against it, if the sensor measured something else there. What is hidden or averted is not asked.
-/// Symmetric in the two poses. At most `most_samples` of the options are asked. Cost: two lookups a sample, and a search and a ray for those that differ.
+/// Symmetric in the two poses. At most `most_samples` of the options are asked. Cost: two lookups a sample, and a
+/// search and a ray for those that differ.
 [[nodiscard]] PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan,
                                     const model::PreparedModel& model, const ScanEvidence& scan,
                                     const EvidenceOptions& options);

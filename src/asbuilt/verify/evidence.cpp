@@ -24,6 +24,7 @@ scan::Scan without(const scan::Scan& scan, const std::vector<std::uint8_t>& back
   rest.viewpoint = scan.viewpoint;
   rest.normals_oriented = scan.normals_oriented;
   rest.spacing_mm = scan.spacing_mm;
+  rest.spacing_by_range = scan.spacing_by_range;
   rest.noise_sigma_mm = scan.noise_sigma_mm;
   for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
     if (background[i] != 0) continue;
@@ -72,11 +73,12 @@ class Judge {
     ++sum.samples;
     const Eigen::Vector3d point = scan_from_model_ * point_in_model.cast<double>();
     const Eigen::Vector3d normal = scan_from_model_.linear() * normal_in_model.cast<double>();
-    const KdTree::Neighbour measured = surface_at(point, normal);
+    const bool is_known = scan_.scan.viewpoint.known();
+    const Eigen::Vector3d towards = is_known ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
+    const double incidence = is_known ? normal.dot(towards) : 0.0;
+    const KdTree::Neighbour measured = surface_at(point, normal, lateral_at(options_, incidence));
     const bool is_there = measured.found();
     sum.explained_anywhere += is_there ? 1 : 0;
-    const Eigen::Vector3d towards =
-        scan_.scan.viewpoint.known() ? scan_.scan.viewpoint.towards_sensor(point) : parallel_direction_;
     const std::optional<double> seen =
         cosine_if_seen(scan_from_model_, point_in_model, normal_in_model, towards, model_);
     if (!seen) return;
@@ -115,8 +117,9 @@ class Judge {
 
  private:
   // The scan point that shows a sample's surface; none if the surface is not there.
-  [[nodiscard]] KdTree::Neighbour surface_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-    const auto reach = static_cast<float>(std::hypot(options_.distance_mm, options_.lateral_mm));
+  [[nodiscard]] KdTree::Neighbour surface_at(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
+                                             double lateral_mm) const {
+    const auto reach = static_cast<float>(std::hypot(options_.distance_mm, lateral_mm));
     const KdTree::Neighbour nearest = scan_.foreground_tree.nearest(point.cast<float>(), reach);
     if (!nearest.found()) return nearest;
     const Eigen::Vector3d offset = scan_.foreground.cloud.positions[nearest.index].cast<double>() - point;
@@ -164,14 +167,27 @@ bool is_thin(const Eigen::Vector3f& in_model, const model::DistanceField::Sample
 
 }  // namespace
 
-ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background)
+ScanEvidence::ScanEvidence(const scan::Scan& the_scan, const std::vector<std::uint8_t>& the_background,
+                           const Context& context)
     : scan(the_scan),
       background(the_background),
       foreground(without(the_scan, the_background)),
-      foreground_tree(foreground.cloud.positions) {
+      foreground_tree(foreground.cloud.positions, context) {
   if (!scan.viewpoint.known()) return;
   depth.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
   field.emplace(scan.cloud.positions, scan.spacing_mm, scan.viewpoint);
+}
+
+double lateral_at(const EvidenceOptions& options, double cosine) {
+  constexpr double kFlat = 0.6;  // cosine
+  const double seen = std::abs(cosine);
+  if (seen >= kFlat || seen == 0.0) return options.lateral_mm;
+  const double apart_mm = options.lateral_mm * kFlat / std::max(seen, kGrazing);
+  return std::max(options.lateral_mm, std::min(apart_mm, options.most_lateral_mm));
+}
+
+double spacing_at(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan) {
+  return scan.spacing_at(model_from_scan.inverse() * model.box.center().eval());
 }
 
 std::optional<double> cosine_if_seen(const Pose& scan_from_model, const Eigen::Vector3f& point_in_model,
@@ -293,7 +309,7 @@ std::optional<double> flat_normal_agreement(const Pose& model_from_scan,
                                             std::span<const Eigen::Vector3f> points_in_scan, const ScanEvidence& scan,
                                             const model::PreparedModel& model, const NormalOptions& options) {
   constexpr std::size_t kMost = 600, kFewest = 30, kFewestInFit = 6;
-  const double radius = normal_radius_mm(scan.scan.noise_sigma_mm, scan.scan.spacing_mm);
+  const double radius = normal_radius_mm(scan.scan.noise_sigma_mm, spacing_at(model_from_scan, model, scan.scan));
   const auto min_cosine = static_cast<float>(std::cos(options.max_angle));
   const Eigen::Matrix3f rotation = model_from_scan.linear().cast<float>();
   const Eigen::Vector3f translation = model_from_scan.translation().cast<float>();

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/pose.h"
@@ -21,18 +22,22 @@ namespace asbuilt::verify {
 struct ScanEvidence {
   /// `background` marks points that cannot be the part's (planes larger than it); they hide and reveal, but never
   /// confirm.
-  ScanEvidence(const scan::Scan& scan, const std::vector<std::uint8_t>& background);
+  ScanEvidence(const scan::Scan& scan, const std::vector<std::uint8_t>& background,
+               const Context& context = Context(1));
 
   const scan::Scan& scan;
   std::vector<std::uint8_t> background;  ///< one a point of the scan
   scan::Scan foreground;                 ///< the scan without them: points, normals, surface variation
   KdTree foreground_tree;
-  std::optional<scan::DepthImage> depth;  ///< of all points, if the viewpoint is known
+  std::optional<scan::DepthImage> depth;   ///< of all points, if the viewpoint is known
   std::optional<scan::FieldOfView> field;  ///< likewise
 };
 
 /// Surfaces seen flatter than this cosine of the incidence (78 degrees) return too little to be asked for.
 inline constexpr double kGrazing = 0.2;
+
+/// Distance between neighbouring measurements, mm, where a pose puts the middle of the model.
+[[nodiscard]] double spacing_at(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan);
 
 /// Cosine of the incidence at which the sensor looks on a sample of the model; nothing if it is averted or grazing, or
 /// if the part itself is in the way. Open skins are seen from either side. `towards_sensor` is a unit vector in the
@@ -75,7 +80,12 @@ struct EvidenceOptions {
   double distance_mm = 1.0;  ///< tau_theta: across the surface
   double lateral_mm = 1.0;   ///< how far along the surface the next measurement may be
   std::size_t most_samples = std::numeric_limits<std::size_t>::max();
+  double most_lateral_mm = std::numeric_limits<double>::infinity();  ///< where surfaces are looked at flatly
 };
+
+/// `lateral_mm` where the sensor looks on a surface at this cosine of the incidence, 0 where it is not known: beyond 53
+/// degrees, rays meet the surface ever farther apart; up to `most_lateral_mm`.
+[[nodiscard]] double lateral_at(const EvidenceOptions& options, double cosine);
 
 /// Asks the scan about every one of `samples` (oriented, in the model frame), or the first `most_samples` of them.
 [[nodiscard]] PoseEvidence evidence_for(const Pose& model_from_scan, const PointCloud& samples,

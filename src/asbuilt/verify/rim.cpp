@@ -9,7 +9,9 @@ namespace asbuilt::verify {
 namespace {
 
 constexpr int kDirections = 8;          // around a sample
-constexpr double kAway = 0.6;           // of the reach: a surface that far off does not go on there
+constexpr double kAway = 0.6;           // of the way: a surface that far off does not go on there
+constexpr double kLeaving = 0.25;       // likewise: one that far off bends away, and is followed a little further
+constexpr int kFarthest = 3;            // reaches that the way past a rounded edge may take
 constexpr double kLateral = 0.45;       // of the reach: where a measurement must lie to say that it does
 constexpr float kSameDirection = 0.9F;  // cosine between the normals of one surface
 
@@ -36,10 +38,16 @@ std::vector<RimProbe> rim_probes(const model::PreparedModel& model, double reach
     for (int k = 0; k < kDirections; ++k) {
       const double angle = 2.0 * std::numbers::pi * k / kDirections;
       const Eigen::Vector3f along = static_cast<float>(std::cos(angle)) * u + static_cast<float>(std::sin(angle)) * v;
-      const Eigen::Vector3f beyond = point + static_cast<float>(reach_mm) * along;
-      const auto there = static_cast<double>(model.field->at(beyond).distance);
-      if (there >= kAway * reach_mm)
-        probes.push_back({point, normal, beyond, model.is_open()});  // unknown is infinitely far
+      for (int reaches = 1; reaches <= kFarthest; ++reaches) {
+        const double way_mm = reaches * reach_mm;
+        const Eigen::Vector3f beyond = point + static_cast<float>(way_mm) * along;
+        const auto there = static_cast<double>(model.field->at(beyond).distance);
+        if (there >= kAway * way_mm) {  // unknown is infinitely far
+          probes.push_back({point, normal, beyond, model.is_open()});
+          break;
+        }
+        if (!(there >= kLeaving * way_mm)) break;
+      }
     }
   }
   return probes;

@@ -12,11 +12,13 @@
 
 namespace asbuilt::verify {
 
-/// A place just past a sharp edge of the model, in the plane of the face that ends there. All in the model frame.
+/// A place just past an edge of the model, sharp or rounded, in the plane of the face that ends there. All in the model
+/// frame.
 struct RimProbe {
   Eigen::Vector3f on_face;  ///< a sample of the face, near its edge
   Eigen::Vector3f normal;   ///< of the face
-  Eigen::Vector3f beyond;   ///< `reach_mm` away along the face, where the model has no surface any more
+  Eigen::Vector3f beyond;   ///< `reach_mm` away along the face, or two or three times that far, where the model has no
+                            ///< surface any more
   bool two_sided = false;   ///< the face belongs to an open skin and may be seen from behind
 };
 

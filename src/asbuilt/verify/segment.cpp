@@ -116,7 +116,7 @@ void set_flying_aside(Segment& segment, std::span<const float> deviation_mm, con
 Segment segment_part(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan,
                      const std::vector<std::uint8_t>& background, const SegmentOptions& options,
                      const Context& context) {
-  const KdTree tree(scan.cloud.positions);
+  const KdTree tree(scan.cloud.positions, context);
   const std::vector<Candidate> all = candidates(model_from_scan, model, scan, background, tree, options, context);
   Surfaces surfaces = connected_surfaces(all, scan, tree, context);
   Segment segment;

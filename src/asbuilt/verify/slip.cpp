@@ -2,7 +2,10 @@
 #include "asbuilt/verify/slip.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "asbuilt/verify/contrast.h"
@@ -25,6 +28,34 @@ double largest_motion_mm(const Vector6d& twist, const model::PreparedModel& mode
   return std::sqrt(largest);
 }
 
+using Twists = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+// Any basis spans the motions that a plane leaves free, but only pure shifts along the part's edges and a pure turn lead
+// to where other edges are met. So the turns come first, then shifts along the axes of the part's box.
+Twists turns_and_shifts(const Twists& basis) {
+  constexpr double kPureShift = 0.05;  // share of the turn in a unit twist
+  const Eigen::Index count = basis.cols();
+  const Eigen::Matrix3Xd turns = basis.topRows<3>();
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(turns, Eigen::ComputeFullV);
+  Twists sorted = basis * svd.matrixV();
+  Eigen::Index first_shift = 0;
+  while (first_shift < std::min<Eigen::Index>(count, 3) && svd.singularValues()[first_shift] > kPureShift) ++first_shift;
+  const Eigen::Index shifts = count - first_shift;
+  if (shifts < 2) return sorted;
+  const Eigen::Matrix3Xd along = sorted.bottomRightCorner(3, shifts);
+  // The box's axes as the shifts can follow them, the best followed first.
+  const Eigen::MatrixXd followed = along.transpose();
+  std::array<Eigen::Index, 3> axes = {0, 1, 2};
+  std::ranges::stable_sort(axes, [&](Eigen::Index a, Eigen::Index b) {
+    return followed.col(a).norm() > followed.col(b).norm() + 1e-9;
+  });
+  Eigen::MatrixXd wanted(shifts, shifts);
+  for (Eigen::Index i = 0; i < shifts; ++i) wanted.col(i) = followed.col(axes[static_cast<std::size_t>(i)]);
+  const Eigen::MatrixXd turned = Eigen::HouseholderQR<Eigen::MatrixXd>(wanted).householderQ();
+  sorted.rightCols(shifts) = (sorted.rightCols(shifts) * turned).eval();
+  return sorted;
+}
+
 // The loosest directions, those that hold less than `below` of information, as twists.
 std::vector<Vector6d> loosest(const PoseEvidence& evidence, const model::PreparedModel& model, double below) {
   // A turn that the part's symmetry makes invisible is no slip.
@@ -33,9 +64,13 @@ std::vector<Vector6d> loosest(const PoseEvidence& evidence, const model::Prepare
     information += 1e3 * evidence.information.trace() * twist * twist.transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
+  Eigen::Index count = 0;
+  while (count < kLoosest && solver.eigenvalues()[count] < below) ++count;
+  if (count == 0) return {};
+  const Twists basis = turns_and_shifts(solver.eigenvectors().leftCols(count));
   std::vector<Vector6d> twists;
-  for (int k = 0; k < kLoosest && solver.eigenvalues()[k] < below; ++k) {
-    Vector6d twist = solver.eigenvectors().col(k);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    Vector6d twist = basis.col(k);
     twist.head<3>() /= 0.5 * model.diameter;  // the evidence measures rotations by the motion at half a diameter
     twists.push_back(twist);
   }
@@ -75,25 +110,36 @@ std::vector<Pose> slipped_poses(const Pose& model_from_scan, const PoseEvidence&
 Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
                            double min_held, const ScanEvidence& scan, const EvidenceOptions& options) {
   constexpr double kSteps[] = {0.03, 0.015, 0.0075, 0.004};  // of the diameter
-  constexpr double kFine = 0.01;                             // where valleys across the directions matter
+  constexpr double kFine = 0.01;                             // below, valleys across the directions matter
+  constexpr double kCoarse = 0.02;                           // above, few samples show where to go
   constexpr int kMostMoves = 4;                              // of each
   constexpr double kLeastGain = 2.0;                         // measurements
-  constexpr std::size_t kFewSamples = 2000;                  // show where to go
+  constexpr std::size_t kFewSamples = 2000;
   Pose settled = model_from_scan;
   EvidenceOptions few = options;
   few.most_samples = std::min(few.most_samples, kFewSamples);
+  const auto gain = [&](const Pose& from, const Pose& to, const EvidenceOptions& how) {
+    const PoseContrast seen = contrast(from, to, model, scan, how);
+    return seen.for_second - seen.for_first;
+  };
   for (const double step : kSteps) {
+    const bool is_coarse = step > kCoarse;
+    const Slips kinds = step > kFine ? Slips::single : Slips::combined;
     for (int move = 0; move < kMostMoves; ++move) {
       const Pose here = settled;
       double most = kLeastGain;
-      const Slips kinds = step > kFine ? Slips::single : Slips::combined;
       for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter, kinds)) {
-        const PoseContrast seen = contrast(here, slipped, model, scan, step > kFine ? few : options);
-        if (seen.for_second - seen.for_first <= most) continue;
-        most = seen.for_second - seen.for_first;
+        const double gained = gain(here, slipped, is_coarse ? few : options);
+        if (gained <= most) continue;
+        most = gained;
         settled = slipped;
       }
       if (settled.isApprox(here)) break;
+      // A handful of few samples at an edge is chance.
+      if (is_coarse && gain(here, settled, options) <= kLeastGain) {
+        settled = here;
+        break;
+      }
     }
   }
   return settled;

@@ -27,10 +27,15 @@ double proof(const Candidate& c) {
   return c.score * c.normal_agreement * std::max(0.0, 1.0 - c.residual_ratio / evenly_strewn) * (1.0 - c.overrun_share);
 }
 
-// What others hide and what returned nothing can lie, and without rays little can be refuted, so that what was found
-// must prove the more.
+bool surface_holds(const Candidate& c, const VerifyOptions& options) {
+  return std::max(c.weakest_direction, c.weakest_but_near) >= hold_needed(c.missing_share, options);
+}
+
+// What others hide and what returned nothing can lie, anything next to an edge can feign it, and without rays little can
+// be refuted, so that what was found must prove the more.
 double proof_needed(const Candidate& c, const VerifyOptions& options) {
   return options.min_proof + options.hidden_surcharge * c.hidden_share + options.missing_surcharge * c.missing_share +
+         (surface_holds(c, options) ? 0.0 : options.edges_surcharge) +
          (c.without_rays ? options.no_rays_surcharge : 0.0);
 }
 
@@ -41,7 +46,9 @@ double edge_measurements_needed(const Candidate& c, const VerifyOptions& options
   constexpr double kShare = 0.006;  // of the measurements explained
   constexpr double kFurtherDirection = 0.75, kWithoutRays = 6.0;
   const double directions = 1.0 + kFurtherDirection * std::max(0, c.loose_directions - 1);
-  const double needed = directions * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
+  // What returned nothing shows neither edges nor that there are none.
+  const double unseen = 1.0 + 2.0 * options.missing_hold_surcharge * c.missing_share;
+  const double needed = directions * unseen * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
   return c.without_rays ? kWithoutRays * needed : needed;
 }
 
@@ -63,8 +70,8 @@ bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
 bool is_held(const Candidate& c, const VerifyOptions& options) {
   constexpr double kEnough = 1.0;  // samples that look along the turn, at half a diameter from the axis
   const bool holds_turn = c.weakest_direction * c.explained_samples >= kEnough;
-  return c.weakest_direction >= options.min_weakest_direction || is_held_by_edges(c, options) ||
-         (c.weakest_but_near >= options.min_weakest_direction && holds_turn);
+  const double needed = hold_needed(c.missing_share, options);
+  return c.weakest_direction >= needed || is_held_by_edges(c, options) || (c.weakest_but_near >= needed && holds_turn);
 }
 
 struct Finding {
@@ -125,7 +132,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
     return {Reason::under_constrained,
             fmt::format("the surface that was found would let the part slide or turn (weakest direction {:.4f}, {:.4f} "
                         "needed), and {:.0f} measurements at its edges hold it ({:.0f} needed)",
-                        c.weakest_direction, options.min_weakest_direction, std::max(0.0, c.slip_lead),
+                        c.weakest_direction, hold_needed(c.missing_share, options), std::max(0.0, c.slip_lead),
                         edge_measurements_needed(c, options))};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
@@ -152,6 +159,24 @@ bool refutes(Reason objection) {
     default:
       return false;
   }
+}
+
+// Whether it clears every limit by so much that a search of the whole scan could not unsettle it.
+bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
+  constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
+  const bool is_held_firmly = c.weakest_direction >= kTwice * hold_needed(c.missing_share, options) ||
+                              c.slip_lead >= kTwice * edge_measurements_needed(c, options);
+  return objection(c, options).reason == Reason::none && is_held_firmly &&
+         proof(c) >= proof_needed(c, options) + kProofToSpare &&
+         c.contradiction_share <= kHalf * options.max_contradiction_share &&
+         c.overrun_share <= kHalf * options.max_overrun_share;
+}
+
+// One flat face between edges fits other things too, now and then: that is no second part, and no better one, beside a
+// pose that the surface holds beyond doubt.
+bool is_outshone(const Candidate& c, const Candidate& other, const VerifyOptions& options) {
+  return c.weakest_direction < hold_needed(c.missing_share, options) && !is_beyond_doubt(c, options) &&
+         other.weakest_direction >= hold_needed(other.missing_share, options) && is_beyond_doubt(other, options);
 }
 
 enum class Outcome { first, second, undecided };
@@ -204,6 +229,14 @@ void put_winner_first(std::vector<Candidate>& candidates, const model::PreparedM
   }
 }
 
+// A pose beyond doubt goes before one that is not and that only edges hold, whatever their supports.
+void put_clear_first(std::vector<Candidate>& candidates, const VerifyOptions& options) {
+  const auto clear = std::ranges::find_if(candidates, [&](const Candidate& other) {
+    return is_comparable(other, candidates.front()) && is_outshone(candidates.front(), other, options);
+  });
+  if (clear != candidates.end()) std::rotate(candidates.begin(), clear, clear + 1);
+}
+
 // Largest distance of the part's surface at one pose from that at another; infinite beyond the field.
 double surface_apart_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
   const Eigen::Isometry3f a_from_b = (a_from_scan * b_from_scan.inverse()).cast<float>();
@@ -229,7 +262,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     const Candidate& rival = candidates[i];
     if (objection(rival, options).reason != Reason::none || !is_comparable(rival, best)) continue;
     if (!is_in_one_place(best, rival, model)) {
-      if (one_of_several) continue;
+      if (one_of_several || is_outshone(rival, best, options)) continue;
       return {Reason::second_instance, second_instance_sentence(best, rival, model)};
     }
     std::optional<PoseContrast> contrast;
@@ -238,7 +271,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     // Along what hardly more than edges hold, a little more surface is found at a wrong pose as easily as at the right
     // one.
     constexpr double kTwice = 2.0;
-    const bool is_firm = best.weakest_direction >= kTwice * options.min_weakest_direction;
+    const bool is_firm = best.weakest_direction >= kTwice * hold_needed(best.missing_share, options);
     const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
@@ -253,7 +286,7 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
 
 // Whether it is loose in nothing but turns about the part's axes of near-symmetry.
 bool is_loose_in_turn_only(Candidate c, const VerifyOptions& options) {
-  if (options.paper_mode || c.weakest_but_near < options.min_weakest_direction) return false;
+  if (options.paper_mode || c.weakest_but_near < hold_needed(c.missing_share, options)) return false;
   c.weakest_direction = c.weakest_but_near;
   return objection(c, options).reason == Reason::none;
 }
@@ -314,6 +347,10 @@ const char* code_of(Reason reason) {
   return "";
 }
 
+double hold_needed(double missing_share, const VerifyOptions& options) {
+  return options.min_weakest_direction * (1.0 + options.missing_hold_surcharge * missing_share);
+}
+
 double displacement_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
   return model::largest_displacement_mm(b_from_scan * a_from_scan.inverse(), model.box);
 }
@@ -328,11 +365,14 @@ std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::si
   std::ranges::stable_sort(candidates, std::ranges::greater{}, &Candidate::support);
   std::vector<Candidate> kept;
   for (const Candidate& candidate : candidates) {
-    if (kept.size() == most) break;
-    const bool is_new = std::ranges::none_of(kept, [&](const Candidate& other) {
+    const auto same = std::ranges::find_if(kept, [&](const Candidate& other) {
       return apart(other.model_from_scan, candidate.model_from_scan, model) <= least_apart_mm;
     });
-    if (is_new) kept.push_back(candidate);
+    if (same != kept.end()) {
+      same->votes = std::max(same->votes, candidate.votes);
+    } else if (kept.size() < most) {
+      kept.push_back(candidate);
+    }
   }
   return kept;
 }
@@ -343,14 +383,7 @@ bool is_comparable(const Candidate& rival, const Candidate& best) {
 }
 
 bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options) {
-  constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
-  if (detection.status != Status::accepted || options.paper_mode) return false;
-  const Candidate& best = detection.best;
-  const bool is_held_firmly = best.weakest_direction >= kTwice * options.min_weakest_direction ||
-                              best.slip_lead >= kTwice * edge_measurements_needed(best, options);
-  return is_held_firmly && proof(best) >= proof_needed(best, options) + kProofToSpare &&
-         best.contradiction_share <= kHalf * options.max_contradiction_share &&
-         best.overrun_share <= kHalf * options.max_overrun_share;
+  return detection.status == Status::accepted && !options.paper_mode && is_beyond_doubt(detection.best, options);
 }
 
 bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
@@ -382,6 +415,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   if (!options.paper_mode) {
     std::ranges::stable_partition(detection.candidates, [](const Candidate& c) { return !refutes(c.objection); });
   }
+  if (!options.paper_mode) put_clear_first(detection.candidates, options);
   const bool is_good = detection.candidates.front().objection == Reason::none;
   if (is_good && compare && !options.paper_mode) put_winner_first(detection.candidates, model, options, compare);
   detection.best = detection.candidates.front();

@@ -22,10 +22,15 @@ namespace asbuilt::verify {
                                             const model::PreparedModel& model);
 
 /// The candidates by decreasing support, at most `most`, each moving the part by more than `least_apart_mm` from every
-/// better one: candidates that ran into the same pose count once. Modulo the symmetry unless in paper mode.
+/// better one: candidates that ran into the same pose count once, with the most votes that any of them had. Modulo the
+/// symmetry unless in paper mode.
 [[nodiscard]] std::vector<Candidate> best_different(std::vector<Candidate> candidates, std::size_t most,
                                                     double least_apart_mm, const model::PreparedModel& model,
                                                     const VerifyOptions& options);
+
+/// The `weakest_direction` that a candidate needs to be held by the surface that was found: the more, the larger the
+/// share of the surface that should be visible and returned nothing, for there nothing can deny the pose.
+[[nodiscard]] double hold_needed(double missing_share, const VerifyOptions& options);
 
 /// Whether a rival is nearly as well proven as the best candidate and explains a fair part of what that one does.
 /// Clutter that passes the thresholds alone is not a second part beside a clear first.

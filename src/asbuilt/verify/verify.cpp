@@ -52,21 +52,35 @@ constexpr double kSamePose = 0.01;  // displacement / diameter up to which two c
 /// One level of the coarse-to-fine pyramid (Sec. 3.1: three of them).
 struct Level {
   double spacing_mm;                      ///< of the scan points used
-  std::array<double, 2> robust_scale_mm;  ///< of the two passes
-  double score_distance_mm;
-  std::size_t most_points;   ///< scan points that a registration takes, spread over the part
-  std::size_t most_samples;  ///< model samples that are asked for evidence, likewise
-  std::size_t survivors;     ///< candidates that reach the next level
+  std::array<double, 2> robust_scale_mm;  ///< of the two passes; of the last level, no less than what counts as on it
+  double least_score_distance_mm;         ///< but no less than what counts as on the model
+  std::size_t most_points;                ///< scan points that a registration takes, spread over the part
+  std::size_t most_samples;               ///< model samples that are asked for evidence, likewise
+  std::size_t survivors;                  ///< candidates that reach the next level
   const PointCloud* model_samples;
   double contradiction_weight;  ///< a right pose has few contradictions, once it is precise
   std::size_t most_rim_probes;  ///< at the part's edges, where its surface must not go on
   bool is_precise;              ///< poses are, so that contradictions refute
+  bool is_finest = false;
 };
 
-double score_distance(const scan::Scan& scan, const model::PreparedModel& model, const VerifyOptions& options) {
+// The published judge knows one spacing a scan.
+double spacing_around(const Pose& model_from_scan, const model::PreparedModel& model, const scan::Scan& scan,
+                      const VerifyOptions& options) {
+  return options.paper_mode ? scan.spacing_mm : spacing_at(model_from_scan, model, scan);
+}
+
+double score_distance(const scan::Scan& scan, double spacing_mm, const model::PreparedModel& model,
+                      const VerifyOptions& options) {
   const double sensor = options.score_distance_mm > 0.0 ? options.score_distance_mm
-                                                        : std::max(3.0 * scan.noise_sigma_mm, 0.5 * scan.spacing_mm);
+                                                        : std::max(3.0 * scan.noise_sigma_mm, 0.5 * spacing_mm);
   return options.paper_mode ? sensor : sensor + options.deviation_ratio * model.diameter;
+}
+
+// What counts as on the model where a pose puts it.
+double score_distance_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                         const VerifyOptions& options) {
+  return score_distance(scan, spacing_around(model_from_scan, model, scan, options), model, options);
 }
 
 // Floors, walls and tables larger than the part would lend their points to any flat face of it.
@@ -95,14 +109,14 @@ VerifyOptions limits_of(VerifyOptions options, Look look) {
 
 // A quick look carries fewer candidates along: what it does not settle is looked at again.
 // The published pyramid takes all points and samples of a level; ours no more than a pose needs.
-std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_distance, Look look, bool paper_mode) {
+std::array<Level, 3> pyramid(const model::PreparedModel& model, Look look, bool paper_mode) {
   const auto most = [&](std::size_t ours) { return paper_mode ? std::numeric_limits<std::size_t>::max() : ours; };
   const double d = model.sampling_distance;
   const std::size_t third = look == Look::quick ? 4 : look == Look::thorough ? 8 : 16;
   const std::size_t second = 2 * third, first = look == Look::quick ? 16 : 5 * third;
   const Level coarse{.spacing_mm = 0.8 * d,
                      .robust_scale_mm = {2.0 * d, d},
-                     .score_distance_mm = std::max(0.5 * d, final_distance),
+                     .least_score_distance_mm = 0.5 * d,
                      .most_points = most(500),
                      .most_samples = most(500),
                      .survivors = first,
@@ -112,7 +126,7 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_dis
                      .is_precise = false};
   const Level middle{.spacing_mm = 0.5 * d,
                      .robust_scale_mm = {0.7 * d, 0.4 * d},
-                     .score_distance_mm = std::max(0.25 * d, final_distance),
+                     .least_score_distance_mm = 0.25 * d,
                      .most_points = most(1000),
                      .most_samples = most(1000),
                      .survivors = second,
@@ -121,16 +135,23 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, double final_dis
                      .most_rim_probes = kSomeRimProbes,
                      .is_precise = true};
   const Level fine{.spacing_mm = 0.3 * d,
-                   .robust_scale_mm = {std::max(0.25 * d, final_distance), std::max(0.15 * d, final_distance)},
-                   .score_distance_mm = final_distance,
+                   .robust_scale_mm = {0.25 * d, 0.15 * d},
+                   .least_score_distance_mm = 0.0,
                    .most_points = most(3000),
                    .most_samples = most(3000),
                    .survivors = third,
                    .model_samples = &model.dense_samples,
                    .contradiction_weight = kContradictionWeight,
                    .most_rim_probes = kSomeRimProbes,
-                   .is_precise = true};
+                   .is_precise = true,
+                   .is_finest = true};
   return {coarse, middle, fine};
+}
+
+Segment segment_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                   const std::vector<std::uint8_t>& background, double score_distance_mm, const Context& context) {
+  const SegmentOptions segmentation{std::max(score_distance_mm, 0.0075 * model.diameter), 0.03 * model.diameter, 0.8};
+  return segment_part(model_from_scan, model, scan, background, segmentation, context);
 }
 
 // In random order, so that the first few of any region are spread over it.
@@ -196,11 +217,9 @@ struct Judge::Material {
         options(the_options),
         context(the_context),
         background(background_of(scan, model, options, context, sampled)),
-        evidence(scan, with(taken, background)),
-        measurements_per_sample(verify::measurements_per_sample(model, scan)),
-        final_distance(score_distance(scan, model, options)),
+        evidence(scan, with(taken, background), context),
         shuffled_foreground(shuffled(evidence.foreground.cloud.positions)),
-        rim_reach(std::max(kRimReach * model.diameter, 2.0 * final_distance)),
+        rim_reach(std::max(kRimReach * model.diameter, 2.0 * score_distance(scan, scan.spacing_mm, model, options))),
         rim_probes(verify::rim_probes(model, rim_reach, kMostRimSamples)),
         one_of_several(!taken.empty()) {}
 
@@ -210,8 +229,6 @@ struct Judge::Material {
   const Context& context;
   std::vector<std::uint8_t> background;
   ScanEvidence evidence;
-  double measurements_per_sample;
-  double final_distance;
   std::vector<Eigen::Vector3f> shuffled_foreground;
   double rim_reach;
   std::vector<RimProbe> rim_probes;
@@ -227,8 +244,6 @@ class Judge::Verification {
         context_(material.context),
         background_(material.background),
         evidence_(material.evidence),
-        measurements_per_sample_(material.measurements_per_sample),
-        final_distance_(material.final_distance),
         shuffled_foreground_(material.shuffled_foreground),
         rim_reach_(material.rim_reach),
         rim_probes_(material.rim_probes),
@@ -238,7 +253,7 @@ class Judge::Verification {
 
   // Sparse registration of all candidates, score, the best go on; three times (Sec. 3.1).
   [[nodiscard]] std::vector<Candidate> coarse_to_fine(std::vector<Candidate> candidates, Look look) const {
-    for (const Level& level : pyramid(model_, final_distance_, look, options_.paper_mode)) {
+    for (const Level& level : pyramid(model_, look, options_.paper_mode)) {
       const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
       parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
         if (!context_.cancelled()) refine_at(level, points, candidates[i]);
@@ -256,7 +271,7 @@ class Judge::Verification {
     std::vector<Candidate> near = near_candidates(candidates);
     if (near.empty()) return false;
     const double best_support = candidates.front().support;
-    const Level level = pyramid(model_, final_distance_, Look::thorough, options_.paper_mode).back();
+    const Level level = pyramid(model_, Look::thorough, options_.paper_mode).back();
     const std::vector<Eigen::Vector3f> points = level_points(evidence_.foreground, level.spacing_mm, context_);
     parallel_for(context_, near.size(), 1, [&](std::size_t i) {
       if (!context_.cancelled()) refine_at(level, points, near[i]);
@@ -272,12 +287,14 @@ class Judge::Verification {
   }
 
   // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
-  // place. The first is not refuted, if any is not: put_refuted_last.
+  // place. The first, which stays whatever its support, is not refuted, if any is not: put_refuted_last.
   [[nodiscard]] std::vector<Candidate> contenders(std::vector<Candidate> candidates) const {
     constexpr double kShare = 0.2;
     if (options_.paper_mode || candidates.empty()) return candidates;
     const double least = kShare * candidates.front().support;
-    std::erase_if(candidates, [&](const Candidate& c) { return c.support < least; });
+    candidates.erase(
+        std::remove_if(candidates.begin() + 1, candidates.end(), [&](const Candidate& c) { return c.support < least; }),
+        candidates.end());
     return candidates;
   }
 
@@ -288,18 +305,19 @@ class Judge::Verification {
 
   [[nodiscard]] PoseContrast contrast_of(const Candidate& first, const Candidate& second) const {
     return contrast(first.model_from_scan, second.model_from_scan, model_, evidence_,
-                    {final_distance_, lateral(final_distance_)});
+                    evidence_options(first.model_from_scan));
   }
 
   // Dense registration, then the judges: evidence over dense samples, and the normals, left out until now.
   void register_densely(Candidate& candidate) const {
     make_canonical(candidate);
+    const double final_distance = final_distance_at(candidate.model_from_scan);
     constexpr std::size_t kEnough = 8000;     // the noise of so many averages out below a field's voxel
     constexpr std::size_t kFewPoints = 2000;  // enough to come close
     const std::size_t most_points = options_.paper_mode ? std::numeric_limits<std::size_t>::max() : kEnough;
     constexpr int kFewIterations = 30, kManyIterations = 300;
     const std::vector<Eigen::Vector3f> around =
-        points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance_, most_points);
+        points_around(shuffled_foreground_, candidate.model_from_scan, model_, 4.0 * final_distance, most_points);
     bool has_converged = false;
     const auto register_at = [&](double scale_mm, int most_iterations, std::size_t most) {
       const auto points = std::span(around).first(std::min(most, around.size()));
@@ -307,14 +325,15 @@ class Judge::Verification {
                                         {scale_mm, most_iterations, only_facing()});
       candidate.model_from_scan = result.model_from_scan;
       candidate.rms_mm = result.rms_mm;
-      candidate.residual_ratio = result.rms_mm / final_distance_;
+      candidate.residual_ratio = result.rms_mm / final_distance;
       has_converged = result.iterations < most_iterations;
     };
-    register_at(1.5 * final_distance_, kFewIterations, kFewPoints);
-    register_at(final_distance_, kFewIterations, most_points);
-    const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    register_at(1.5 * final_distance, kFewIterations, kFewPoints);
+    register_at(final_distance, kFewIterations, most_points);
+    const EvidenceOptions options = evidence_options(candidate.model_from_scan);
     const auto judged_densely = [&] {
-      return judge(candidate, model_.dense_samples, model_.dense_samples.size(), final_distance_, kContradictionWeight);
+      return judge(candidate, model_.dense_samples, options_within(candidate.model_from_scan, final_distance),
+                   kContradictionWeight);
     };
     PoseEvidence evidence = judged_densely();
     const auto is_plausible = [&] {
@@ -322,18 +341,19 @@ class Judge::Verification {
              candidate.contradiction_share <= kClearly * options_.max_contradiction_share;
     };
     if (is_plausible() && !has_converged) {  // a wrong pose may take for ever, a right one must arrive
-      register_at(final_distance_, kManyIterations, most_points);
+      register_at(final_distance, kManyIterations, most_points);
       evidence = judged_densely();
     }
     const auto is_loose = [&] {
-      return !options_.paper_mode && candidate.weakest_direction < options_.min_weakest_direction;
+      return !options_.paper_mode && candidate.weakest_direction < hold_needed(candidate.missing_share, options_);
     };
     // What edges show is read as finely as this part fits, not as deviating parts may.
     const double edge_distance =
-        std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance_, final_distance_);
-    const EvidenceOptions edge_options{edge_distance, lateral(edge_distance)};
+        std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance, final_distance);
+    const EvidenceOptions edge_options = options_within(candidate.model_from_scan, edge_distance);
     const auto settled = [&](const Pose& pose) {
-      return settled_between_edges(pose, evidence, model_, options_.min_weakest_direction, evidence_, edge_options);
+      return settled_between_edges(pose, evidence, model_, hold_needed(candidate.missing_share, options_), evidence_,
+                                   edge_options);
     };
     if (is_loose() && may_have_drifted(candidate)) {
       const Pose drifted = candidate.model_from_scan;
@@ -344,23 +364,25 @@ class Judge::Verification {
     if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     constexpr int kMostMoves = 2;
     for (int move = 0; is_loose() && is_plausible(); ++move) {
-      candidate.loose_directions = loose_directions(evidence, model_, options_.min_weakest_direction);
-      const Slip rival = strongest_rival(candidate.model_from_scan, evidence, around, edge_options);
+      candidate.loose_directions = loose_directions(evidence, model_, hold_needed(candidate.missing_share, options_));
+      const Slip rival = strongest_rival(candidate, evidence, around, edge_options);
       candidate.slip_lead = std::isfinite(rival.lead_over_it) ? rival.lead_over_it : 0.0;
       if (candidate.slip_lead >= 0.0 || move == kMostMoves) break;
       candidate.model_from_scan = settled(rival.model_from_scan);
       evidence = judged_densely();
       if (candidate.without_rays && !model_.is_open()) judge_without_rays(candidate);
     }
-    candidate.explained_measurements = measurements_per_sample_ * candidate.explained_samples;
+    candidate.explained_measurements =
+        measurements_per_sample(model_, spacing_around(candidate.model_from_scan, model_, scan_, options_)) *
+        candidate.explained_samples;
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     judge_normals(candidate);
   }
 
   void cut_out(Detection& detection) const {
-    const SegmentOptions segmentation{std::max(final_distance_, 0.0075 * model_.diameter), 0.03 * model_.diameter, 0.8};
-    Segment segment = segment_part(detection.best.model_from_scan, model_, scan_, background_, segmentation, context_);
+    const Pose& pose = detection.best.model_from_scan;
+    Segment segment = segment_at(pose, scan_, model_, background_, final_distance_at(pose), context_);
     detection.segment = std::move(segment.part);
     detection.margin_points = std::move(segment.margin);
   }
@@ -372,16 +394,18 @@ class Judge::Verification {
     constexpr double kLeaderShare = 0.7;  // of the best support
     std::vector<Candidate> near;
     if (options_.paper_mode || candidates.empty()) return near;
-    const bool is_loose = candidates.front().weakest_direction < options_.min_weakest_direction;
+    const bool is_loose =
+        candidates.front().weakest_direction < hold_needed(candidates.front().missing_share, options_);
     const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : is_loose ? 1 : 0;
     for (std::size_t i = 0; i < std::min(leaders, candidates.size()); ++i) {
       if (candidates[i].support < kLeaderShare * candidates.front().support) break;
       const Pose& pose = candidates[i].model_from_scan;
+      const double distance = final_distance_at(pose);
       const std::vector<Eigen::Vector3f> around =
-          points_around(shuffled_foreground_, pose, model_, final_distance_, kMostPoints);
-      std::vector<Pose> poses = near_poses(pose, around, model_, final_distance_);
+          points_around(shuffled_foreground_, pose, model_, distance, kMostPoints);
+      std::vector<Pose> poses = near_poses(pose, around, model_, distance);
       if (i == 0 && is_loose) {
-        std::ranges::copy(turned_in_box(pose, around, model_, final_distance_), std::back_inserter(poses));
+        std::ranges::copy(turned_in_box(pose, around, model_, distance), std::back_inserter(poses));
       }
       for (const Pose& there : poses) {
         near.push_back(candidates[i]);
@@ -392,7 +416,7 @@ class Judge::Verification {
   }
 
   // Of the poses into which the part may have slipped that which comes closest, or one that explains the scan better.
-  [[nodiscard]] Slip strongest_rival(const Pose& model_from_scan, const PoseEvidence& evidence,
+  [[nodiscard]] Slip strongest_rival(const Candidate& candidate, const PoseEvidence& evidence,
                                      std::span<const Eigen::Vector3f> points_in_scan,
                                      const EvidenceOptions& edge_options) const {
     Slip strongest;
@@ -400,29 +424,32 @@ class Judge::Verification {
       if (slip.lead_over_it < strongest.lead_over_it) strongest = slip;
     };
     for (const double slip : kSlips) {
-      consider(strongest_slip(model_from_scan, evidence, model_, options_.min_weakest_direction, slip * model_.diameter,
-                              evidence_, edge_options));
+      consider(strongest_slip(candidate.model_from_scan, evidence, model_,
+                              hold_needed(candidate.missing_share, options_), slip * model_.diameter, evidence_,
+                              edge_options));
     }
     if (strongest.lead_over_it > 0.0 && std::isfinite(strongest.lead_over_it)) {
-      consider(strongest_far_slip(model_from_scan, evidence, points_in_scan, edge_options));
+      consider(strongest_far_slip(candidate, evidence, points_in_scan, edge_options));
     }
     return strongest;
   }
 
   // The same over poses further along the loose directions, each brought onto the surface again.
-  [[nodiscard]] Slip strongest_far_slip(const Pose& model_from_scan, const PoseEvidence& evidence,
+  [[nodiscard]] Slip strongest_far_slip(const Candidate& candidate, const PoseEvidence& evidence,
                                         std::span<const Eigen::Vector3f> points_in_scan,
                                         const EvidenceOptions& edge_options) const {
     constexpr std::size_t kMostPoints = 2000;
     constexpr int kMostIterations = 20;
     const auto points = points_in_scan.first(std::min(kMostPoints, points_in_scan.size()));
+    const Pose& model_from_scan = candidate.model_from_scan;
+    const double scale_mm = 1.5 * final_distance_at(model_from_scan);
     Slip strongest;
     for (const double slip : kFarSlips) {
-      for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model_, options_.min_weakest_direction,
-                                               slip * model_.diameter, Slips::single)) {
-        const Pose there =
-            lm_icp(points, slipped, model_, scan_.viewpoint, {1.5 * final_distance_, kMostIterations, only_facing()})
-                .model_from_scan;
+      for (const Pose& slipped :
+           slipped_poses(model_from_scan, evidence, model_, hold_needed(candidate.missing_share, options_),
+                         slip * model_.diameter, Slips::single)) {
+        const Pose there = lm_icp(points, slipped, model_, scan_.viewpoint, {scale_mm, kMostIterations, only_facing()})
+                               .model_from_scan;
         if (displacement_modulo_mm(model_from_scan, there, model_) <= kSamePlace * model_.diameter) continue;
         const PoseContrast seen = contrast(model_from_scan, there, model_, evidence_, edge_options);
         const double lead = seen.for_first - seen.for_second;
@@ -458,9 +485,9 @@ class Judge::Verification {
 
   void put_refuted_last(const Level& level, std::vector<Candidate>& candidates) const {
     const auto probes = std::span(rim_probes_).first(std::min(level.most_rim_probes, rim_probes_.size()));
-    const EvidenceOptions options{level.score_distance_mm, lateral(level.score_distance_mm)};
     parallel_for(context_, candidates.size(), 1, [&](std::size_t i) {
       Candidate& candidate = candidates[i];
+      const EvidenceOptions options = evidence_options(candidate.model_from_scan, level.least_score_distance_mm);
       candidate.overrun_share =
           rim_evidence(candidate.model_from_scan, probes, rim_reach_, evidence_, options).overrun_share();
     });
@@ -477,14 +504,20 @@ class Judge::Verification {
   }
 
   void refine_at(const Level& level, const std::vector<Eigen::Vector3f>& points, Candidate& candidate) const {
+    std::array<double, 2> scales = level.robust_scale_mm;
+    if (level.is_finest) {
+      for (double& scale : scales) scale = std::max(scale, final_distance_at(candidate.model_from_scan));
+    }
     const std::vector<Eigen::Vector3f> around =
-        points_around(points, candidate.model_from_scan, model_, 2.0 * level.robust_scale_mm[0], level.most_points);
-    for (const double scale : level.robust_scale_mm) {
+        points_around(points, candidate.model_from_scan, model_, 2.0 * scales[0], level.most_points);
+    for (const double scale : scales) {
       candidate.model_from_scan =
           lm_icp(around, candidate.model_from_scan, model_, scan_.viewpoint, {scale, 10, only_facing()})
               .model_from_scan;
     }
-    judge(candidate, *level.model_samples, level.most_samples, level.score_distance_mm, level.contradiction_weight);
+    EvidenceOptions how = evidence_options(candidate.model_from_scan, level.least_score_distance_mm);
+    how.most_samples = level.most_samples;
+    judge(candidate, *level.model_samples, how, level.contradiction_weight);
   }
 
   // Walls turned away from the sensor hold no points; a sheet has no such side.
@@ -498,39 +531,53 @@ class Judge::Verification {
     const std::vector<Eigen::Vector3f> around =
         points_around(shuffled_foreground_, candidate.model_from_scan, model_, kDepth * model_.diameter, kMostPoints);
     const Pose& pose = candidate.model_from_scan;
-    const EvidenceOptions options{final_distance_, lateral(final_distance_)};
+    const EvidenceOptions options = evidence_options(pose);
     candidate.contradiction_share =
-        std::max({candidate.contradiction_share, share_within(pose, around, model_, final_distance_),
+        std::max({candidate.contradiction_share, share_within(pose, around, model_, options.distance_mm),
                   share_seen_from_behind(pose, around, model_, evidence_, options)});
   }
 
   // The published judge asks every point; ours those whose normals mean something, and passes where there are none.
   void judge_normals(Candidate& candidate) const {
     constexpr std::size_t kMostPoints = 3000;
-    const NormalOptions options{final_distance_, options_.max_normal_angle_deg * std::numbers::pi / 180.0};
     const Pose& pose = candidate.model_from_scan;
+    const NormalOptions options{final_distance_at(pose), options_.max_normal_angle_deg * std::numbers::pi / 180.0};
     if (options_.paper_mode) {
       candidate.normal_agreement = normal_agreement(pose, evidence_.foreground, model_, options);
       return;
     }
     const std::vector<Eigen::Vector3f> around =
-        points_around(shuffled_foreground_, pose, model_, final_distance_, kMostPoints);
+        points_around(shuffled_foreground_, pose, model_, options.distance_mm, kMostPoints);
     candidate.normal_agreement =
         flat_normal_agreement(pose, around, evidence_, model_, options).value_or(options_.min_normal_agreement);
   }
 
-  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, std::size_t most_samples, double distance_mm,
+  PoseEvidence judge(Candidate& candidate, const PointCloud& samples, const EvidenceOptions& how,
                      double contradiction_weight) const {
-    const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_,
-                                               {distance_mm, lateral(distance_mm), most_samples});
+    const PoseEvidence evidence = evidence_for(candidate.model_from_scan, samples, model_, evidence_, how);
     take_evidence(candidate, evidence, model_, contradiction_weight);
     if (options_.paper_mode) candidate.score = candidate.support = candidate.visible_share;
     return evidence;
   }
 
-  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours.
-  [[nodiscard]] double lateral(double distance_mm) const {
-    return options_.paper_mode ? 0.0 : std::max(2.5 * scan_.spacing_mm, distance_mm);
+  [[nodiscard]] double final_distance_at(const Pose& model_from_scan) const {
+    return score_distance_at(model_from_scan, scan_, model_, options_);
+  }
+
+  [[nodiscard]] EvidenceOptions evidence_options(const Pose& model_from_scan, double least_distance_mm = 0.0) const {
+    return options_within(model_from_scan, std::max(least_distance_mm, final_distance_at(model_from_scan)));
+  }
+
+  // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours. Where surfaces are
+  // looked at flatly, there is room up to what it is at the scan's median spacing.
+  [[nodiscard]] EvidenceOptions options_within(const Pose& model_from_scan, double distance_mm) const {
+    constexpr double kRoomInSpacings = 2.5;
+    EvidenceOptions options{distance_mm, 0.0};
+    if (options_.paper_mode) return options;
+    const double spacing_mm = spacing_around(model_from_scan, model_, scan_, options_);
+    options.lateral_mm = std::max(kRoomInSpacings * spacing_mm, distance_mm);
+    options.most_lateral_mm = std::max(kRoomInSpacings * scan_.spacing_mm, distance_mm);
+    return options;
   }
 
   const scan::Scan& scan_;
@@ -539,8 +586,6 @@ class Judge::Verification {
   const Context& context_;
   const std::vector<std::uint8_t>& background_;
   const ScanEvidence& evidence_;
-  double measurements_per_sample_;
-  double final_distance_;
   const std::vector<Eigen::Vector3f>& shuffled_foreground_;
   double rim_reach_;
   const std::vector<RimProbe>& rim_probes_;
@@ -562,8 +607,10 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("min_proof", min_proof, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("hidden_surcharge", hidden_surcharge, 0.0, 10.0));
   ASBUILT_CHECK(expect_between("missing_surcharge", missing_surcharge, 0.0, 10.0));
+  ASBUILT_CHECK(expect_between("edges_surcharge", edges_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("no_rays_surcharge", no_rays_surcharge, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("min_weakest_direction", min_weakest_direction, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("missing_hold_surcharge", missing_hold_surcharge, 0.0, 100.0));
   ASBUILT_CHECK(expect_between("near_equal_ratio", near_equal_ratio, 0.0, 0.1));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_joint_denial", max_joint_denial, 0.0, 2.0));
@@ -614,6 +661,12 @@ Result<Detection> Judge::verdict_on(std::span<const detect::Hypothesis> hypothes
     candidates.push_back(candidate);
   }
   return Verification(*material_, look).verdict_on(std::move(candidates), look, accept_anyway);
+}
+
+Segment part_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                const VerifyOptions& options, const detect::SampledScan& sampled, const Context& context) {
+  return segment_at(model_from_scan, scan, model, background_of(scan, model, options, context, &sampled),
+                    score_distance_at(model_from_scan, scan, model, options), context);
 }
 
 Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,

@@ -11,6 +11,7 @@
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/scan/scan.h"
 #include "asbuilt/verify/detection.h"
+#include "asbuilt/verify/segment.h"
 
 namespace asbuilt::verify {
 
@@ -31,12 +32,15 @@ struct VerifyOptions {
   double hidden_surcharge =
       0.15;  ///< added to min_proof per share of the part that other things hide: what hides can lie
   double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
+  double edges_surcharge = 0.12;          ///< likewise where only edges hold the pose
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it
+  double missing_hold_surcharge =
+      3.0;  ///< times as much more of it is asked for per share that returned nothing; of edges twice that
   double near_equal_ratio = 0.01;   ///< surfaces of two poses this close / diameter, everywhere, need not be told apart
   double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
-      1.5;  ///< contradictions and overrun, each as a share of its limit, together: right poses reach at most 1.2
+      1.0;  ///< contradictions and overrun, each as a share of its limit, together: right poses hardly exceed 0.8
   double max_normal_angle_deg = 30.0;  ///< normals closer than this agree
   bool paper_mode = false;
 
@@ -73,9 +77,12 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
         "share of the claimed surface that the scan may deny");
   field("min_proof", options.min_proof, "score * normal agreement * fit that a detection needs");
   field("hidden_surcharge", options.hidden_surcharge, "added to min_proof per share of the part that is hidden");
+  field("edges_surcharge", options.edges_surcharge, "likewise where only edges hold the pose");
   field("missing_surcharge", options.missing_surcharge, "likewise per share that returned nothing");
   field("no_rays_surcharge", options.no_rays_surcharge, "likewise where the viewpoint is unknown");
   field("min_weakest_direction", options.min_weakest_direction, "how firmly the found surface must hold the pose");
+  field("missing_hold_surcharge", options.missing_hold_surcharge,
+        "how many times more hold is asked for per share that returned nothing; twice that of edges");
   field("near_equal_ratio", options.near_equal_ratio,
         "distance / diameter within which the surfaces of two poses need not be told apart");
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
@@ -113,6 +120,12 @@ class Judge {
   class Verification;
   std::unique_ptr<const Material> material_;
 };
+
+/// The part's points at a pose that is known, and those around them: what a judge cuts out at the pose that it accepts.
+/// `sampled` is the scan, or a thinned copy of it, as detection looked at it; what lies on its large planes is not the
+/// part's.
+[[nodiscard]] Segment part_at(const Pose& model_from_scan, const scan::Scan& scan, const model::PreparedModel& model,
+                              const VerifyOptions& options, const detect::SampledScan& sampled, const Context& context);
 
 /// One question to a judge of its own.
 [[nodiscard]] Result<Detection> verify(const scan::Scan& scan, const model::PreparedModel& model,

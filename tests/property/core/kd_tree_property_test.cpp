@@ -5,6 +5,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/random.h"
 
@@ -138,6 +139,27 @@ TEST_F(KdTreeOracle, NearestFacingIsThatOfBruteForce) {
     }
     ASSERT_TRUE(is_same(tree.nearest_facing(query, reach, cloud.directions, direction, 0.7F), expected));
   });
+}
+
+TEST(KdTree, BuiltByAllThreadsAnswersAsOneBuiltByOne) {
+  Random random(7, "many points", 0);
+  std::vector<Vector3f> points;
+  for (int i = 0; i < 120000; ++i) {
+    const Vector3f point = random_point(random);
+    points.push_back(i % 3 == 0 ? Vector3f((8.0F * point).array().round().matrix() / 8.0F) : point);
+  }
+  const KdTree one(points), all(points, Context(3));
+  Neighbours expected, found;
+  for (int i = 0; i < 3000; ++i) {
+    const Vector3f query = random_point(random);
+    one.nearest(query, 12, expected);
+    all.nearest(query, 12, found);
+    ASSERT_TRUE(std::ranges::equal(found, expected, is_same));
+    one.within(query, 0.05F, expected);
+    all.within(query, 0.05F, found);
+    ASSERT_TRUE(std::ranges::equal(found, expected, is_same));
+  }
+  EXPECT_FALSE(KdTree(std::vector<Vector3f>(), Context(2)).nearest(points[0]).found());
 }
 
 }  // namespace

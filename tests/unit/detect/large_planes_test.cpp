@@ -32,6 +32,8 @@ void add_rectangle(PointCloud& cloud, const Eigen::Vector3f& centre, const Eigen
 
 const Eigen::Vector3f kX = Eigen::Vector3f::UnitX(), kY = Eigen::Vector3f::UnitY(), kZ = Eigen::Vector3f::UnitZ();
 
+std::vector<float> even(const PointCloud& cloud) { return std::vector<float>(cloud.size(), 1.0F); }
+
 std::size_t marked(const std::vector<std::uint8_t>& marks, std::size_t begin, std::size_t end) {
   return static_cast<std::size_t>(std::count(marks.begin() + static_cast<std::ptrdiff_t>(begin),
                                              marks.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{1}));
@@ -45,7 +47,7 @@ TEST(LargePlanes, AreMarkedAndSmallOnesKept) {
   add_rectangle(cloud, {0, 0, 12}, kX, kY, 20, 10);
   add_rectangle(cloud, {0, 5, 6.5F}, kX, kZ, 20, 11);
   add_rectangle(cloud, {10, 0, 6.5F}, kY, kZ, 10, 11);
-  const auto marks = on_large_planes(cloud, 1.0, 30.0, Context(2));
+  const auto marks = on_large_planes(cloud, even(cloud), 30.0, Context(2));
   EXPECT_GE(marked(marks, 0, floor), floor * 99 / 100);
   EXPECT_EQ(marked(marks, floor, cloud.size()), 0U);
 }
@@ -53,14 +55,14 @@ TEST(LargePlanes, AreMarkedAndSmallOnesKept) {
 TEST(LargePlanes, AreFoundUnderNoise) {
   PointCloud cloud;
   add_rectangle(cloud, {0, 0, 0}, kX, kY, 60, 60, 0.08F);
-  EXPECT_GE(marked(on_large_planes(cloud, 1.0, 30.0, Context(2)), 0, cloud.size()), cloud.size() * 95 / 100);
+  EXPECT_GE(marked(on_large_planes(cloud, even(cloud), 30.0, Context(2)), 0, cloud.size()), cloud.size() * 95 / 100);
 }
 
 TEST(LargePlanes, AreJudgedByTheirExtentNotTheirArea) {
   PointCloud strip;
   add_rectangle(strip, {0, 0, 0}, kX, kY, 60, 3);
-  EXPECT_EQ(marked(on_large_planes(strip, 1.0, 50.0, Context(2)), 0, strip.size()), strip.size());
-  EXPECT_EQ(marked(on_large_planes(strip, 1.0, 65.0, Context(2)), 0, strip.size()), 0U);
+  EXPECT_EQ(marked(on_large_planes(strip, even(strip), 50.0, Context(2)), 0, strip.size()), strip.size());
+  EXPECT_EQ(marked(on_large_planes(strip, even(strip), 65.0, Context(2)), 0, strip.size()), 0U);
 }
 
 // A drum's wall bends on from sample to sample, each flat to the next, but is no plane.
@@ -75,26 +77,43 @@ TEST(LargePlanes, AreNotWhatBendsGently) {
       drum.normals.push_back(normal);
     }
   }
-  EXPECT_EQ(marked(on_large_planes(drum, 1.0, 50.0, Context(2)), 0, drum.size()), 0U);
+  EXPECT_EQ(marked(on_large_planes(drum, even(drum), 50.0, Context(2)), 0, drum.size()), 0U);
 }
 
 TEST(LargePlanes, DoNotDependOnTheSignOfNormals) {
   PointCloud cloud;
   add_rectangle(cloud, {0, 0, 0}, kX, kY, 60, 60);
   for (std::size_t i = 0; i < cloud.size(); i += 2) cloud.normals[i] = -cloud.normals[i];
-  EXPECT_EQ(marked(on_large_planes(cloud, 1.0, 30.0, Context(2)), 0, cloud.size()), cloud.size());
+  EXPECT_EQ(marked(on_large_planes(cloud, even(cloud), 30.0, Context(2)), 0, cloud.size()), cloud.size());
 }
 
 TEST(LargePlanes, AreTheSameForAnyNumberOfThreads) {
   PointCloud cloud;
   add_rectangle(cloud, {0, 0, 0}, kX, kY, 60, 60, 0.15F);
   add_rectangle(cloud, {0, 0, 12}, kX, kY, 20, 10, 0.15F);
-  const auto expected = on_large_planes(cloud, 1.0, 30.0, Context(1));
-  EXPECT_EQ(on_large_planes(cloud, 1.0, 30.0, Context(2)), expected);
-  EXPECT_EQ(on_large_planes(cloud, 1.0, 30.0, Context(3)), expected);
+  const auto expected = on_large_planes(cloud, even(cloud), 30.0, Context(1));
+  EXPECT_EQ(on_large_planes(cloud, even(cloud), 30.0, Context(2)), expected);
+  EXPECT_EQ(on_large_planes(cloud, even(cloud), 30.0, Context(3)), expected);
 }
 
-TEST(LargePlanes, OfNothingAreNone) { EXPECT_TRUE(on_large_planes({}, 1.0, 30.0, Context(1)).empty()); }
+// A turning scanner measures the far end of a hall so sparsely that its samples are farther apart than those of the
+// part.
+TEST(LargePlanes, GoOnWhereTheScanIsSparse) {
+  PointCloud cloud;
+  add_rectangle(cloud, {0, 0, 0}, kX, kY, 60, 60);
+  std::vector<float> spacings = even(cloud);
+  const std::size_t near = cloud.size();
+  add_rectangle(cloud, {112, 0, 0}, 4.0F * kX, 4.0F * kY, 40, 15, 0.5F);
+  spacings.resize(cloud.size(), 4.0F);
+  const auto marks = on_large_planes(cloud, spacings, 70.0, Context(2));
+  EXPECT_GE(marked(marks, near, cloud.size()), (cloud.size() - near) * 95 / 100);
+  EXPECT_GE(marked(marks, 0, near), near * 95 / 100)
+      << "the near end alone is too small, but the far end goes on from it";
+  EXPECT_EQ(marked(on_large_planes(cloud, even(cloud), 100.0, Context(2)), 0, cloud.size()), 0U)
+      << "with one spacing for all, nothing links the far end";
+}
+
+TEST(LargePlanes, OfNothingAreNone) { EXPECT_TRUE(on_large_planes({}, {}, 30.0, Context(1)).empty()); }
 
 }  // namespace
 }  // namespace asbuilt::detect

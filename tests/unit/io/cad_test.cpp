@@ -164,13 +164,47 @@ TEST(Brep, IsReadInMillimetres) {
   EXPECT_NEAR(volume(model->mesh), 6000.0, 1e-6);
 }
 
+TEST(Brep, CutAnywhereIsAnErrorOrTheWholeShape) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "shape.brep";
+  BRepTools::Write(box(10, 20, 30), path.c_str());
+  const std::string whole = content_of(path);
+  std::size_t last_error = 0;
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    const auto model = model_from("cut.brep", {"cut.brep", std::string_view(whole).substr(0, length)}, Unit::stated);
+    if (!model) last_error = length;
+    if (model) {
+      EXPECT_NEAR(volume(model->mesh), 6000.0, 1e-6) << length << " of " << whole.size();
+    }
+  }
+  EXPECT_GE(last_error + 4, whole.size()) << "more is missing than blanks behind the last number";
+}
+
+std::filesystem::path iges_cube(const TemporaryFolder& folder) {
+  auto path = folder.path() / "shape.igs";
+  IGESControl_Writer writer("IN", 1);  // as solids
+  EXPECT_TRUE(writer.AddShape(box(254, 254, 254)));
+  writer.ComputeModel();
+  EXPECT_TRUE(writer.Write(path.c_str()));
+  return path;
+}
+
+TEST(Iges, CutAnywhereIsAnError) {
+  const TemporaryFolder folder;
+  const std::string whole = content_of(iges_cube(folder));
+  // The mark of section T stands in column 73 of the last line; behind it are but digits that count the lines.
+  const std::size_t mark = whole.rfind('T');
+  ASSERT_EQ(whole.find_last_not_of("\r\n"), mark + 7);
+  for (std::size_t length = 0; length <= mark; ++length) {
+    const auto model = model_from("cut.igs", {"cut.igs", std::string_view(whole).substr(0, length)}, Unit::stated);
+    ASSERT_FALSE(model) << length << " of " << whole.size();
+    EXPECT_THAT(model.error().message, HasSubstr("cut.igs"));
+  }
+}
+
 TEST(Iges, IsReadInTheUnitThatItStates) {
   const TemporaryFolder folder;
-  const auto path = folder.path() / "shape.igs";
-  IGESControl_Writer writer("IN", 1);  // as solids
-  ASSERT_TRUE(writer.AddShape(box(254, 254, 254)));
-  writer.ComputeModel();
-  ASSERT_TRUE(writer.Write(path.c_str()));
+  const auto path = iges_cube(folder);
   const auto model = read_model(path, Unit::stated);
   ASSERT_TRUE(model) << model.error().message;
   EXPECT_EQ(model->format, "iges");

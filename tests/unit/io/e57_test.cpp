@@ -33,6 +33,15 @@ TEST(Crc32c, GivesTheCheckValueOfItsDefinition) {
   EXPECT_EQ(crc32c(std::string(32, '\xff')), 0x62A8AB43u);
 }
 
+TEST(Crc32c, IsTheSameByInstructionByTablesAndBitByBit) {
+  std::string bytes;
+  for (int length = 0; length < 70; ++length) {
+    EXPECT_EQ(crc32c(bytes), test::plain_crc32c(bytes)) << length;
+    EXPECT_EQ(crc32c_by_tables(bytes), test::plain_crc32c(bytes)) << length;
+    bytes += static_cast<char>(37 * length + 11);
+  }
+}
+
 TEST(E57, ReadsScaledIntegersPackedBitByBitAcrossPackets) {
   // x of 5 bits from -3, in tenths of a metre; y of 1 bit; z without bits, always 7.
   const std::vector<int> raw_x{0, 31, 7, 16, 1, 30, 2}, raw_y{1, 0, 0, 1, 1, 0, 1};

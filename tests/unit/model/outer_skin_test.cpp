@@ -14,6 +14,24 @@ OuterSkin skin_of(const TriangleMesh& mesh, bool keep_inner = false) {
   return outer_skin(mesh, face_visibility(mesh, RayScene(mesh), {}, context), keep_inner);
 }
 
+TriangleMesh split_skin_of(const TriangleMesh& mesh) {
+  const SeenMesh seen = split_where_hidden(mesh, RayScene(mesh), {}, Context(2));
+  return outer_skin(seen.mesh, seen.visibility, false).mesh;
+}
+
+/// Area of the triangles whose corners are all such.
+template <class Condition>
+double area_where(const TriangleMesh& mesh, const Condition& is_such) {
+  double area = 0.0;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto corner = [&](int k) { return mesh.vertices[static_cast<std::size_t>(mesh.triangles[i][k])]; };
+    if (is_such(corner(0)) && is_such(corner(1)) && is_such(corner(2))) {
+      area += 0.5 * doubled_area_vector(mesh, i).norm();
+    }
+  }
+  return area;
+}
+
 TriangleMesh unit_box(int cuts = 1) { return test::joined(test::box({0, 0, 0}, {10, 10, 10}, cuts)); }
 
 TEST(FaceVisibility, OfAConvexBodyIsAllOutsideAndNothingInside) {
@@ -196,7 +214,7 @@ TEST(OuterSkin, KeepsALargeUnsplitFaceOfWhichOnlyARimIsVisible) {
 TEST(OuterSkin, DropsWhatABoxCoversOfALargeFaceAndKeepsTheRim) {
   const TriangleMesh mesh = test::together(test::box({0, 0, 0}, {100, 100, 5}), test::box({3, 3, 5}, {97, 97, 60}));
   const RayScene rays(mesh);
-  const SeenMesh seen = split_where_covered(mesh, rays, {}, Context(2));
+  const SeenMesh seen = split_where_hidden(mesh, rays, {}, Context(2));
   EXPECT_NEAR(surface_area(seen.mesh), surface_area(mesh), 1e-6);
   const OuterSkin skin = outer_skin(seen.mesh, seen.visibility, false);
   double on_top = 0.0;
@@ -212,13 +230,34 @@ TEST(OuterSkin, DropsWhatABoxCoversOfALargeFaceAndKeepsTheRim) {
   EXPECT_NEAR(surface_area(skin.mesh) - on_top, 100.0 * 100.0 + 4.0 * 500.0 + 94.0 * 94.0 + 4.0 * 94.0 * 55.0, 1e-6);
 }
 
-TEST(OuterSkin, DoesNotSplitWhatABodyHidesByItsOwnShape) {
-  // A slot 1 wide and 60 deep in a U: nobody sees far down, yet nothing else covers its walls.
+TEST(OuterSkin, KeepsTheDepthOfASlotOfOneBody) {
+  // A slot 1 wide and 60 deep in a U: nobody sees far down, yet without its walls the skin would be open.
   const TriangleMesh left = test::box({0, 0, 0}, {10, 30, 60}), right = test::box({11, 0, 0}, {21, 30, 60});
-  TriangleMesh u = test::together(test::together(left, right), test::box({10, 0, 0}, {11, 30, 1}));
-  u = test::joined(u);
-  const SeenMesh seen = split_where_covered(u, RayScene(u), {}, Context(2));
-  EXPECT_EQ(seen.mesh.triangles.size(), u.triangles.size());
+  const TriangleMesh u = test::joined(test::together(test::together(left, right), test::box({10, 0, 0}, {11, 30, 1})));
+  EXPECT_NEAR(surface_area(split_skin_of(u)), surface_area(u), 1e-6);
+}
+
+TEST(OuterSkin, DropsWhatABodyCoversOfItsOwnFaces) {
+  // Plate and box have an edge in common, so that they are one body.
+  const TriangleMesh mesh =
+      test::joined(test::together(test::box({0, 0, 0}, {100, 100, 5}), test::box({0, 0, 5}, {100, 90, 60})));
+  const double at_z5 = area_where(split_skin_of(mesh), [](const Eigen::Vector3d& p) { return p.z() == 5.0; });
+  EXPECT_GE(at_z5, 100.0 * 10.0 - 1e-6);
+  EXPECT_LE(at_z5, 100.0 * (10.0 + 2.0 * 0.015 * diameter(mesh)));
+}
+
+TEST(OuterSkin, TakesForTheDepthOfABoreOnlyWhatNoOtherBodyCovers) {
+  // A strip of three large triangles: in plain sight, dim, and dark.
+  TriangleMesh strip;
+  strip.vertices = {{0, 0, 0}, {0, 10, 0}, {10, 0, 0}, {10, 10, 0}, {20, 0, 0}};
+  strip.triangles = {{0, 2, 1}, {1, 2, 3}, {2, 4, 3}};
+  std::vector<FaceVisibility> seen(3);
+  seen[0] = {.front = 0.9F, .is_visible = true};
+  seen[1] = {.front = 0.01F, .is_visible = true, .is_dim = true};
+  seen[2] = {.hidden = 1.0F};
+  EXPECT_EQ(outer_skin(strip, seen, false).mesh.triangles.size(), 3U);
+  seen[2].covered = 1.0F;
+  EXPECT_EQ(outer_skin(strip, seen, false).mesh.triangles.size(), 2U);
 }
 
 TEST(FaceVisibility, OfTheFloorOfASlitThatOnlyGrazingRaysLeave) {

@@ -64,10 +64,10 @@ TEST(PipelineOptions, AScanMayHaveAUnitOfItsOwn) {
   options.scan_unit = io::Unit::metre;
   options.scan_units = {"scan_01:inch", "b/scan_02.ply:foot", "C:\\odd:name.ply:cm"};
   ASSERT_TRUE(options.validate());
-  EXPECT_EQ(scan_reading(options, "a/scan_00.ply").unit, io::Unit::metre);
-  EXPECT_EQ(scan_reading(options, "a/scan_01.ply").unit, io::Unit::inch);
-  EXPECT_EQ(scan_reading(options, "b/scan_02.ply").unit, io::Unit::foot);
-  EXPECT_EQ(scan_reading(options, "C:\\odd:name.ply").unit, io::Unit::centimetre);
+  EXPECT_EQ(scan_reading(options, "a/scan_00.ply", Context(1)).unit, io::Unit::metre);
+  EXPECT_EQ(scan_reading(options, "a/scan_01.ply", Context(1)).unit, io::Unit::inch);
+  EXPECT_EQ(scan_reading(options, "b/scan_02.ply", Context(1)).unit, io::Unit::foot);
+  EXPECT_EQ(scan_reading(options, "C:\\odd:name.ply", Context(1)).unit, io::Unit::centimetre);
   for (const char* wrong : {"scan_01", ":m", "scan_01:", "scan_01:mile"}) {
     options.scan_units = {wrong};
     EXPECT_FALSE(options.validate()) << wrong;

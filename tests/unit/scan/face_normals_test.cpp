@@ -48,7 +48,8 @@ TEST(FaceNormals, OfAThinProfileAreThoseOfItsFaces) {
   Bar bar = thin_bar(spacing, sigma);
   const KdTree tree(bar.cloud.positions);
   bar.cloud.normals =
-      scan::fitted_normals(bar.cloud.positions, tree, scan::neighbours_for_normals(sigma, spacing), Context(2)).normals;
+      scan::fitted_normals(bar.cloud.positions, tree, spacing, scan::neighbours_for_normals(sigma, spacing), Context(2))
+          .normals;
   const Eigen::Vector3f outwards = -(Eigen::Vector3f::UnitY() + Eigen::Vector3f::UnitZ());
   for (Eigen::Vector3f& normal : bar.cloud.normals) {
     if (normal.dot(outwards) < 0.0F) normal = -normal;

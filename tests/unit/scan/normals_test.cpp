@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+
+#include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/scan/scan.h"
 #include "unit/scan/clouds.h"
 
@@ -82,6 +86,66 @@ TEST(Normals, TiltByAboutThreeDegreesWhateverTheNoise) {
     // Two axes of 0.05 rad each: 4 degrees RMS; twice that would say the formula is wrong.
     EXPECT_LT(std::sqrt(squared), 8.0) << "sigma " << sigma;
   }
+}
+
+// The plane through the nearest points found one by one; equally near ones by index.
+PlaneFit by_brute_force(const std::vector<Eigen::Vector3f>& points, std::size_t i, std::size_t count) {
+  std::vector<KdTree::Neighbour> all;
+  for (std::uint32_t k = 0; k < points.size(); ++k) all.push_back({k, (points[k] - points[i]).squaredNorm()});
+  std::ranges::sort(all, [](const auto& a, const auto& b) {
+    return std::pair(a.squared_distance, a.index) < std::pair(b.squared_distance, b.index);
+  });
+  all.resize(std::min(count, all.size()));
+  return fit_plane(points, all);
+}
+
+void expect_those_of_brute_force(const std::vector<Eigen::Vector3f>& points, std::size_t count) {
+  const KdTree tree(points);
+  const FittedNormals fitted = fitted_normals(points, tree, median_spacing(points, tree), count, Context(2));
+  ASSERT_EQ(fitted.normals.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); i += 7) {
+    const PlaneFit plane = by_brute_force(points, i, count);
+    ASSERT_NEAR(fitted.variation[i], plane.variation, 1e-5F) << "point " << i;
+    if (plane.variation > 0.2F) continue;  // hardly a plane: its normal may turn with the last digit
+    ASSERT_GT(std::abs(fitted.normals[i].dot(plane.normal)), 0.9999F) << "point " << i;
+  }
+}
+
+TEST(FittedNormals, AreThoseOfTheNearestPoints) {
+  expect_those_of_brute_force(test::plane_cloud(60.0, 1.0, 20.0, 0.3, 5).positions, 12);
+  expect_those_of_brute_force(test::sphere_cloud({0, 0, 600}, 80.0, 4000, -1.0, 0.2, 3).positions, 46);
+}
+
+// As a laser scanner's, near and far, with points that stand alone.
+TEST(FittedNormals, AreThoseOfTheNearestPointsWhateverTheDensity) {
+  std::vector<Eigen::Vector3f> points = test::plane_cloud(20.0, 0.2, 0.0, 0.02, 7).positions;
+  for (const Eigen::Vector3f& far : test::plane_cloud(3000.0, 100.0, 2000.0, 5.0, 8).positions) points.push_back(far);
+  points.emplace_back(0.0F, 0.0F, 500.0F);
+  points.emplace_back(30000.0F, 0.0F, 500.0F);
+  expect_those_of_brute_force(points, 20);
+}
+
+TEST(FittedNormals, OfEquallyNearPointsGoByTheIndex) {
+  std::vector<Eigen::Vector3f> grid;
+  for (int i = 0; i < 900; ++i) {
+    grid.emplace_back(static_cast<float>(i % 30), static_cast<float>(i / 30), i % 2 == 0 ? 0.0F : 0.125F);
+  }
+  for (const std::size_t count : {6U, 7U, 12U, 30U}) expect_those_of_brute_force(grid, count);
+}
+
+TEST(FittedNormals, OfFewPointsAreThoseOfAll) {
+  expect_those_of_brute_force(test::plane_cloud(5.0, 1.0, 20.0, 0.3, 5).positions, 60);
+  const std::vector<Eigen::Vector3f> two{{0, 0, 0}, {1, 0, 0}};
+  EXPECT_TRUE(fitted_normals(two, KdTree(two), 1.0, 12, Context(2)).normals[0].isZero(0.0F));
+}
+
+TEST(FittedNormals, AreTheSameWhateverTheThreads) {
+  const std::vector<Eigen::Vector3f> points = test::sphere_cloud({0, 0, 600}, 80.0, 9000, -0.5, 0.2, 3).positions;
+  const KdTree tree(points);
+  const FittedNormals one = fitted_normals(points, tree, 1.0, 30, Context(1));
+  const FittedNormals three = fitted_normals(points, tree, 1.0, 30, Context(3));
+  EXPECT_EQ(one.variation, three.variation);
+  EXPECT_TRUE(std::ranges::equal(one.normals, three.normals));
 }
 
 TEST(PlaneFit, OfFewerThanThreePointsIsNone) {

@@ -39,6 +39,36 @@ TEST(Evidence, OfTheTruePoseIsAllForIt) {
   EXPECT_EQ(evidence.samples, block().dense_samples.size());
 }
 
+TEST(Evidence, LooksFurtherAlongWhatIsLookedAtFlatly) {
+  const EvidenceOptions options{0.5, 3.0};
+  EXPECT_EQ(lateral_at(options, 1.0), 3.0);
+  EXPECT_EQ(lateral_at(options, 0.7), 3.0);
+  EXPECT_NEAR(lateral_at(options, 0.3), 6.0, 1e-12);
+  EXPECT_EQ(lateral_at(options, -0.3), lateral_at(options, 0.3)) << "a sheet has two sides";
+  EXPECT_EQ(lateral_at(options, 0.01), lateral_at(options, kGrazing)) << "such samples are not asked";
+  EXPECT_EQ(lateral_at(options, 0.0), 3.0) << "unknown";
+}
+
+// A sensor of coarser steps one way than the other: by the distance to the nearest, a plate looked at flatly has gaps.
+TEST(Evidence, GapsBetweenRaysDenyNothing) {
+  const Eigen::Vector3d tilt(1.28, 0, 0);  // 73 degrees
+  const Pose pose = test::pose_at(kPlace, tilt);
+  static const model::PreparedModel plate = test::prepared(simulate::box({200, 200, 5}), 0.03);
+  scan::Scan dense = test::seen({simulate::transformed(simulate::box({200, 200, 5}), pose), wall()}, 0.25, 0.002);
+  PointCloud rows;  // every second row of rays
+  for (const Eigen::Vector3f& point : dense.cloud.positions) {
+    const auto row = std::lround((static_cast<double>(point.y() / point.z()) - 2e-5 + 0.25) / 0.002);
+    if (row % 2 == 0) rows.positions.push_back(point);
+  }
+  const scan::ViewpointRequest origin{false, {scan::Viewpoint::Kind::point, Eigen::Vector3d::Zero()}};
+  const scan::Scan scan = scan::prepare_scan(rows, std::nullopt, origin, {}, Context(2)).value();
+  const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+  const PoseEvidence found = evidence_for(pose.inverse(), plate.dense_samples, plate, evidence,
+                                          {0.5, 2.5 * spacing_at(pose.inverse(), plate, scan)});
+  EXPECT_LT(found.contradicted + found.seen_through, 0.015 * found.facing);
+  EXPECT_GT(found.score(), 0.97);
+}
+
 TEST(Evidence, EverySampleThatOughtToBeSeenIsOfOneKind) {
   const Pose pose = test::pose_at(kPlace), claimed = test::pose_at(kPlace + Eigen::Vector3d(30, 10, 5));
   const PoseEvidence e = judged(test::seen({part_at(pose), wall()}), claimed);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -81,6 +82,31 @@ TEST(Slip, DirectionsThatTheSurfaceHoldsAreNotTried) {
   EXPECT_EQ(loose_directions(slab.evidence, slab.model, kLimits.min_weakest_direction), 3);
 }
 
+// Any three motions span those that a plane leaves free; its edges are met along these.
+TEST(Slip, AFaceSlipsAlongTheAxesOfItsBoxOrTurnsInItself) {
+  Pose turned(Eigen::Translation3d(0, 0, 500));
+  turned.rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
+  const Asked slab(simulate::box({400, 300, 40}), turned, {}, 0.25);
+  int along_x = 0, along_y = 0, turns = 0;
+  for (const Pose& pose : slipped_poses(slab.model_from_scan, slab.evidence, slab.model,
+                                        kLimits.min_weakest_direction, 4.0, Slips::single)) {
+    const Pose motion = pose * slab.model_from_scan.inverse();
+    const Eigen::AngleAxisd turn(motion.linear());
+    const Eigen::Vector3d shift = motion * slab.model.box.center().eval() - slab.model.box.center();
+    if (turn.angle() > 1e-3) {
+      ++turns;
+      EXPECT_NEAR(std::abs(turn.axis().z()), 1.0, 1e-2);
+      EXPECT_LT(shift.norm(), 0.1);
+    } else {
+      along_x += std::abs(shift.x()) > 0.999 * shift.norm() ? 1 : 0;
+      along_y += std::abs(shift.y()) > 0.999 * shift.norm() ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(turns, 2);
+  EXPECT_EQ(along_x, 2);
+  EXPECT_EQ(along_y, 2);
+}
+
 // The field of view ends on the face, so that nothing but a plane is seen.
 TEST(Slip, AFaceWithoutItsEdgesHoldsNothing) {
   const Asked slab(simulate::box({400, 400, 40}), Pose(Eigen::Translation3d(0, 0, 500)), {}, 0.25);
@@ -111,7 +137,7 @@ TEST(Slip, ABeamThatReachesOutOfTheFieldOfViewIsNot) {
 
 TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
   const Asked seen(beam(300), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
-  for (const double drift_mm : {-25.0, 12.0, 20.0}) {
+  for (const double drift_mm : {-25.0, -3.0, 2.0, 12.0, 20.0}) {
     const Pose drifted = Eigen::Translation3d(drift_mm, 0, 0) * seen.model_from_scan;
     const PoseEvidence evidence = evidence_for(drifted, seen.model.dense_samples, seen.model, *seen.seen, seen.options);
     const Pose settled =

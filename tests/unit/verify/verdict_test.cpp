@@ -92,6 +92,20 @@ TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradi
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
 }
 
+// 0.004 of at least 0.0035 * (1 + 3 * missing); 25 of at least 10.8 * (1 + 6 * missing) measurements.
+TEST(Verdict, AsksForMoreHoldWhereMoreReturnedNothing) {
+  const auto reason_of = [](double weakest_direction, double slip_lead, double missing_share) {
+    Candidate candidate = flawless();
+    candidate.weakest_direction = weakest_direction, candidate.slip_lead = slip_lead;
+    candidate.loose_directions = 1, candidate.missing_share = missing_share;
+    return decide({candidate}, block(), {}).reason;
+  };
+  EXPECT_EQ(reason_of(0.004, 0.0, 0.03), Reason::none);
+  EXPECT_EQ(reason_of(0.004, 0.0, 0.08), Reason::under_constrained);
+  EXPECT_EQ(reason_of(0.0, 25.0, 0.2), Reason::none);
+  EXPECT_EQ(reason_of(0.0, 25.0, 0.3), Reason::under_constrained);
+}
+
 TEST(Verdict, TheOutlineOfOneFaceProvesAPlateButNotABlock) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
@@ -120,6 +134,7 @@ TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
 TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
+  candidate.residual_ratio = 0.05;  // proves enough without rays
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
   candidate.without_rays = true;
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
@@ -154,6 +169,17 @@ TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
 }
 
+TEST(Verdict, AsksForMoreProofWhereOnlyEdgesHoldThePose) {
+  Candidate candidate = flawless();
+  candidate.score = 0.8, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.42
+  candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  candidate.weakest_direction = 0.0;  // 0.34 + 0.12 = 0.46
+  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  candidate.residual_ratio = 0.1;  // proves 0.53
+  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
 TEST(Verdict, AsksForMoreProofWhereNoRayCanRefuteThePose) {
   Candidate candidate = flawless();
   candidate.score = 0.9, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.53
@@ -168,7 +194,7 @@ TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
   Candidate candidate = flawless();
   candidate.contradiction_share = 0.028;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
-  candidate.overrun_share = 0.09;
+  candidate.overrun_share = 0.03;  // 0.93 and 0.25 of their limits
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
   candidate.contradiction_share = 0.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
@@ -196,6 +222,24 @@ TEST(Verdict, OnASecondInstanceIsAmbiguous) {
   EXPECT_EQ(detection.status, Status::ambiguous);
   EXPECT_EQ(detection.reason, Reason::second_instance);
   EXPECT_EQ(detection.candidates.size(), 2U);
+}
+
+TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
+  const auto status_beside = [](const Candidate& best, double missing_share, double support) {
+    Candidate face = flawless({300, 0, 600});
+    face.weakest_direction = 0.0, face.slip_lead = 60.0, face.loose_directions = 2;
+    face.missing_share = missing_share, face.support = support;
+    return decide({best, face}, block(), {});
+  };
+  for (const double support : {0.3, 0.5}) {
+    const Detection detection = status_beside(flawless(), 0.3, support);
+    EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
+    EXPECT_GT(detection.best.weakest_direction, 0.0);
+  }
+  EXPECT_EQ(status_beside(flawless(), 0.0, 0.3).reason, Reason::second_instance) << "edges hold it beyond doubt";
+  Candidate doubtful = flawless();
+  doubtful.contradiction_share = 0.02;
+  EXPECT_EQ(status_beside(doubtful, 0.3, 0.3).reason, Reason::second_instance);
 }
 
 TEST(Verdict, KnowsASecondPlacementFromClutterAndFromAnotherPoseInThePlace) {
@@ -240,11 +284,12 @@ TEST(Verdict, IsNotShakenByARivalThatWouldBeRejected) {
 
 TEST(Verdict, CountsNearlyEqualPosesAsOne) {
   Candidate again = flawless({0.5, 0, 600});
-  again.support = 0.39;
+  again.support = 0.39, again.votes = 100.0;
   const Detection detection = decide({again, flawless()}, block(), {});
   EXPECT_EQ(detection.status, Status::accepted);
   EXPECT_EQ(detection.candidates.size(), 1U);
   EXPECT_EQ(detection.best.support, 0.4) << "the best, in whatever order they come";
+  EXPECT_EQ(detection.best.votes, 100.0) << "the votes of all of them are for this pose";
   EXPECT_EQ(detection.margin, 0.4);
 }
 

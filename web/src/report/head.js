@@ -7,9 +7,11 @@ import { verdict_class, verdict_icon } from '../shared/verdict.js';
 const figure = (value, label, detail) =>
   h('div', { class: 'figure' }, h('dt', null, label), h('dd', null, value, detail && h('small', null, detail)));
 
-const worst = (stats) => {
+/** Of the spots and of the regions, whose peaks lie between spots. */
+const worst = (stats, regions) => {
   if (!stats || typeof stats.min !== 'number') return null;
-  return Math.abs(stats.min) > Math.abs(stats.max) ? stats.min : stats.max;
+  const peaks = (regions ?? []).filter((region) => region.significant !== false).map((region) => region.peak);
+  return [stats.min, stats.max, ...peaks].reduce((far, value) => (Math.abs(value) > Math.abs(far) ? value : far));
 };
 
 export function head(report) {
@@ -33,7 +35,7 @@ function figures(report, area, coverage, decimals) {
   list.push(figure(signed_mm(area?.mean, decimals), 'mean deviation', 'over the area'));
   list.push(figure(mm(area?.sigma, decimals), 'standard deviation', typeof area?.sigma_without_noise === 'number' ? `${mm(area.sigma_without_noise, decimals)} without noise` : null));
   list.push(figure(mm(area?.p95, decimals), '95 % stay below', 'absolute deviation'));
-  list.push(figure(signed_mm(worst(area), decimals), 'largest deviation', plural(report.regions?.length ?? 0, 'region', 'regions') + (report.verdict.tolerance_given ? ' out of tolerance' : ' stand out')));
+  list.push(figure(signed_mm(worst(area, report.regions), decimals), 'largest deviation', plural(report.regions?.length ?? 0, 'region', 'regions') + (report.verdict.tolerance_given ? ' out of tolerance' : ' stand out')));
   if (report.scans?.length) list.push(figure(`${accepted} of ${report.scans.length}`, 'scans used', scans_detail(report)));
   return list;
 }

@@ -34,24 +34,25 @@ export function statistics_table({ over_area: area, over_points: points, decimal
 
 const band = (limits, decimals) => (limits ? `${signed(limits[0], decimals)} \u2026 ${signed(limits[1], decimals)}` : kNone);
 
-const figure_columns = (decimals) => [
-  { title: 'verdict', of: (row) => verdict_badge(row.verdict) },
+/** Without any tolerance there is nothing to judge: three columns less. */
+const figure_columns = ({ decimals, verdict }) => [
+  verdict.tolerance_given && { title: 'verdict', of: (row) => verdict_badge(row.verdict) },
   { title: 'scanned', of: (row) => percent(row.coverage), numeric: true },
-  { title: 'in tolerance', of: (row) => percent(row.in_tolerance), numeric: true },
-  { title: 'tolerance, mm', of: (row) => band(row.tolerance, Math.min(3, decimals)), numeric: true },
+  verdict.tolerance_given && { title: 'in tolerance', of: (row) => percent(row.in_tolerance), numeric: true },
+  verdict.tolerance_given && { title: 'tolerance, mm', of: (row) => band(row.tolerance, Math.min(3, decimals)), numeric: true },
   { title: 'mean', of: (row) => signed(row.mean, decimals), numeric: true },
   { title: 'std. dev.', of: (row) => number(row.sigma, decimals), numeric: true },
   { title: 'smallest', of: (row) => signed(row.min, decimals), numeric: true },
   { title: 'largest', of: (row) => signed(row.max, decimals), numeric: true },
   { title: '95 %', of: (row) => number(row.p95, decimals), numeric: true },
   { title: 'area, mm²', of: (row) => short(row.area), numeric: true },
-];
+].filter(Boolean);
 
 export const faces_table = (report, go) =>
-  shortened([{ title: report.model.cad_faces ? 'CAD face' : 'piece', of: (face) => face.name }, ...figure_columns(report.decimals)], by_severity(report.faces),
+  shortened([{ title: report.model.cad_faces ? 'CAD face' : 'piece', of: (face) => face.name, class: 'name' }, ...figure_columns(report)], by_severity(report.faces),
     { on_row: go && ((row, face) => make_button(row, `Show ${face.name}`, () => go({ face: face.index }))) });
 
-export const boxes_table = (report) => table([{ title: 'named region', of: (box) => box.name }, ...figure_columns(report.decimals)], report.boxes);
+export const boxes_table = (report) => table([{ title: 'named region', of: (box) => box.name, class: 'name' }, ...figure_columns(report)], report.boxes);
 
 export function regions_table(report, go) {
   const d = report.decimals;
@@ -83,7 +84,7 @@ export function scans_table(report) {
     { title: '#', of: (scan) => number(scan.index), numeric: true }, { title: 'scan', of: (scan) => scan.name, class: 'name' },
     { title: 'status', of: (scan) => status_badge(scan.status) },
     { title: 'points', of: (scan) => number(scan.points), numeric: true }, { title: 'on the part', of: (scan) => number(scan.segment_points), numeric: true },
-    { title: 'share of part', of: (scan) => percent(scan.share_of_part), numeric: true }, { title: 'score', of: (scan) => number(scan.score, 2), numeric: true },
+    { title: 'main source of', of: (scan) => percent(scan.share_of_part), numeric: true }, { title: 'score', of: (scan) => number(scan.score, 2), numeric: true },
     { title: 'links', of: (scan) => number(scan.links), numeric: true }, { title: 'best overlap', of: (scan) => percent(scan.best_overlap, 0), numeric: true },
     { title: 'residual, mm', of: (scan) => number(scan.residual, d), numeric: true }, { title: 'position 1σ', of: (scan) => number(scan.position_sigma, d), numeric: true },
     { title: 'rotation 1σ', of: (scan) => (typeof scan.rotation_sigma_deg === 'number' ? `${number(scan.rotation_sigma_deg, 3)}°` : kNone), numeric: true },

@@ -88,8 +88,11 @@ function silhouette({ positions, box }, right, up) {
 export function graph_picture({ nodes, links, surface }) {
   const { places, right, up } = layout(nodes);
   const where = new Map(nodes.map((node, i) => [node.id, places[i]]));
-  const reach = Math.max(kRing, ...places.map(([x, y]) => Math.max(Math.abs(x), Math.abs(y)))) + 2 * kNode;
-  const picture = svg('svg', { class: 'graph', viewBox: `${-reach} ${-reach} ${2 * reach} ${2 * reach}`, width: kSize, role: 'img', 'aria-label': `Pose graph of ${nodes.length} scans` });
+  // No higher than it is wide, and no emptier than what stands in it.
+  const part = 0.45 * kRing, margin = 2 * kNode;
+  const reach = Math.max(kRing, ...places.map(([x]) => Math.abs(x))) + margin;
+  const top = Math.min(-part, ...places.map(([, y]) => y)) - margin, bottom = Math.max(part, ...places.map(([, y]) => y)) + margin;
+  const picture = svg('svg', { class: 'graph', viewBox: `${-reach} ${top} ${2 * reach} ${bottom - top}`, width: kSize, role: 'img', 'aria-label': `Pose graph of ${nodes.length} scans` });
   if (surface) picture.append(svg('polygon', { class: 'part', points: silhouette(surface, right, up) }));
   for (const link of [...links].sort((a, b) => a.linked - b.linked || a.overlap - b.overlap)) {
     const [a, b] = [where.get(link.from), where.get(link.to)];

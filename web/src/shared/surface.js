@@ -10,7 +10,7 @@ export function read_surface(scene) {
   for (const vertex of triangles) {
     if (vertex * 3 >= positions.length) throw new Error(`a triangle names vertex ${vertex}, there are ${positions.length / 3}`);
   }
-  return { positions, triangles, faces, normals: vertex_normals(positions, triangles), edges: open_edges(triangles), box: box_of(positions) };
+  return { positions, triangles, faces, normals: vertex_normals(positions, triangles), edges: long_edges(positions, open_edges(triangles), box_of(positions).diameter), box: box_of(positions) };
 }
 
 export function box_of(positions) {
@@ -65,6 +65,54 @@ export function open_edges(triangles) {
   }
   // A surface in crumbs has no outline worth drawing.
   return edges.length > Math.max(5000, triangles.length / 5) ? new Uint32Array(0) : new Uint32Array(edges);
+}
+
+/**
+ * The edges without dashes and spurs: chains that end in nothing and are shorter than 4 % of the diameter. They come from
+ * slivers, and from fillets whose facets differ by about the angle at which vertices are split.
+ */
+export function long_edges(positions, edges, diameter) {
+  const least = 0.04 * diameter;
+  // Both sides of a sharp edge have vertices of their own at the same place.
+  const places = new Map();
+  const place_of = (v) => {
+    const key = `${positions[3 * v]},${positions[3 * v + 1]},${positions[3 * v + 2]}`;
+    if (!places.has(key)) places.set(key, places.size);
+    return places.get(key);
+  };
+  const ends = Array.from(edges, place_of);
+  const neighbours = Array.from({ length: places.size }, () => new Map());  // place -> length of the edge
+  for (let i = 0; i < edges.length; i += 2) {
+    if (ends[i] === ends[i + 1]) continue;
+    const length = Math.hypot(...[0, 1, 2].map((k) => positions[3 * edges[i] + k] - positions[3 * edges[i + 1] + k]));
+    neighbours[ends[i]].set(ends[i + 1], length);
+    neighbours[ends[i + 1]].set(ends[i], length);
+  }
+  // A spur may bear spurs.
+  for (let round = 0, cut = true; cut && round < 4; ++round) {
+    cut = false;
+    for (let tip = 0; tip < neighbours.length; ++tip) {
+      if (neighbours[tip].size !== 1) continue;
+      const chain = [tip];
+      let length = 0;
+      for (let at = tip, from = -1; length < least;) {
+        const next = [...neighbours[at].keys()].find((place) => place !== from);
+        length += neighbours[at].get(next);
+        [from, at] = [at, next];
+        chain.push(at);
+        if (neighbours[at].size !== 2) break;
+      }
+      if (length >= least) continue;
+      for (let i = 1; i < chain.length; ++i) {
+        neighbours[chain[i - 1]].delete(chain[i]);
+        neighbours[chain[i]].delete(chain[i - 1]);
+      }
+      cut = true;
+    }
+  }
+  const kept = [];
+  for (let i = 0; i < edges.length; i += 2) if (neighbours[ends[i]].has(ends[i + 1])) kept.push(edges[i], edges[i + 1]);
+  return new Uint32Array(kept);
 }
 
 /** The nearest hit of a ray from the side it comes from: {triangle, point, weights} or null. Möller and Trumbore. */

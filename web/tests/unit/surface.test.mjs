@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { open_edges, pick, read_surface, value_at, vertex_normals } from '../../src/shared/surface.js';
+import { long_edges, open_edges, pick, read_surface, value_at, vertex_normals } from '../../src/shared/surface.js';
 import { bent_plate, packed, packed_positions } from '../support/example-surface.mjs';
 
 // A square of 2 mm in z = 1, facing +z.
@@ -38,6 +38,16 @@ test('only edges of one triangle are outline: of a square its four sides', () =>
   const edges = open_edges(square.triangles);
   const pairs = Array.from({ length: edges.length / 2 }, (_, i) => `${edges[2 * i]}-${edges[2 * i + 1]}`).sort();
   assert.deepEqual(pairs, ['0-1', '0-3', '1-2', '2-3']);
+});
+
+test('short dashes and spurs are no outline; loops, long dashes and what holds them together are', () => {
+  // A square of 10 with a spur of 2 at one corner, itself forked, a dash of 3 and one of 30; the diameter is 100.
+  const points = [[0, 0], [10, 0], [10, 10], [0, 10], [12, 0], [13, 1], [13, -1], [50, 0], [53, 0], [60, 0], [75, 0], [90, 0]];
+  // The other side of the square's first edge has vertices of its own.
+  points.push([0, 0], [10, 0]);
+  const positions = Float32Array.from(points.flatMap(([x, y]) => [x, y, 0]));
+  const edges = Uint32Array.of(0, 1, 1, 2, 2, 3, 3, 0, 12, 13, 1, 4, 4, 5, 4, 6, 7, 8, 9, 10, 10, 11);
+  assert.deepEqual([...long_edges(positions, edges, 100)], [0, 1, 1, 2, 2, 3, 3, 0, 12, 13, 9, 10, 10, 11]);
 });
 
 test('a triangle that names a missing vertex is refused', () => {
