@@ -102,7 +102,7 @@ Result<bool> separate_individuals(const RefinedComponent& component, std::vector
   const refine::ComparedViews views(views_of(component.members, scans), model.prepared.diameter, context);
   ASBUILT_TRY(found, refine::two_individuals(views, refined_poses(component, scans), component.links, context));
   if (!found) return false;
-  const int next = 1 + std::ranges::max_element(scans, {}, &PosedScan::individual)->individual;
+  int next = 1 + std::ranges::max_element(scans, {}, &PosedScan::individual)->individual;
   for (const std::vector<int>& group : {found->first, found->second}) {
     const std::string reason = fmt::format(
         "of another individual: where both were measured, its surface lies elsewhere in {:.0f} % of the places, "
@@ -114,6 +114,15 @@ Result<bool> separate_individuals(const RefinedComponent& component, std::vector
       scan.individual_reason = reason;
       if (group == found->second) scan.individual = next;
     }
+  }
+  for (const int view : found->undecided) {
+    PosedScan& scan = scan_of(view, component, scans);
+    scan.individual = ++next;
+    scan.individual_reason = fmt::format(
+        "of one of two individuals, and it does not show of which: it meets the others only where both are alike; "
+        "these "
+        "belong together: {}; and these: {}",
+        names_of(found->first, component, scans, record), names_of(found->second, component, scans, record));
   }
   return true;
 }

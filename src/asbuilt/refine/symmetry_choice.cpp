@@ -33,7 +33,8 @@ std::vector<std::vector<std::size_t>> quotients(std::span<const Pose> elements) 
 
 struct Comparison {
   std::size_t a = 0, b = 0;
-  std::vector<double> evidence;  // that they differ, by the element between them
+  std::vector<double> evidence{};       // that they differ, by the element between them
+  std::vector<std::size_t> compared{};  // patches that both measured then
 };
 
 class Choice {
@@ -57,6 +58,17 @@ class Choice {
       if (chosen[other] < 0) continue;
       const auto own = static_cast<std::size_t>(e), theirs = static_cast<std::size_t>(chosen[other]);
       sum += comparison.evidence[comparison.a == v ? between_[own][theirs] : between_[theirs][own]];
+    }
+    return sum;
+  }
+
+  // Patches that a view shares with all others.
+  [[nodiscard]] std::size_t shared(std::size_t v, const std::vector<int>& chosen) const {
+    std::size_t sum = 0;
+    for (const std::size_t c : of_view_[v]) {
+      const Comparison& comparison = comparisons_[c];
+      const auto first = static_cast<std::size_t>(chosen[comparison.a]);
+      sum += comparison.compared[between_[first][static_cast<std::size_t>(chosen[comparison.b])]];
     }
     return sum;
   }
@@ -118,14 +130,18 @@ class Choice {
     return chosen;
   }
 
+  // An element under which a view meets hardly any other is not confirmed by their having nothing to differ in.
   [[nodiscard]] bool is_decided(std::size_t v, std::size_t reference, const std::vector<int>& chosen) const {
+    constexpr double kFewestShared = 0.5;  // of what it would share at another element
     const double at_best = total(chosen), own = cost(v, chosen[v], chosen);
+    const auto met = static_cast<double>(shared(v, chosen));
     for (int e = 0; e < static_cast<int>(elements_); ++e) {
       if (e == chosen[v]) continue;
       std::vector<int> other = chosen;
       other[v] = e;
       improve(other, {v, reference});
       if (total(other) - at_best <= std::max(kDecisive, own)) return false;
+      if (met < kFewestShared * static_cast<double>(shared(v, other))) return false;
     }
     return true;
   }
@@ -141,12 +157,12 @@ std::vector<Comparison> pairs_of(std::size_t views, std::span<const Link> links)
   std::vector<Comparison> pairs;
   if (static_cast<int>(views) > kAllPairsUpTo) {
     for (const Link& link : links) {
-      pairs.push_back({static_cast<std::size_t>(link.first), static_cast<std::size_t>(link.second), {}});
+      pairs.push_back({static_cast<std::size_t>(link.first), static_cast<std::size_t>(link.second)});
     }
     return pairs;
   }
   for (std::size_t a = 0; a < views; ++a) {
-    for (std::size_t b = a + 1; b < views; ++b) pairs.push_back({a, b, {}});
+    for (std::size_t b = a + 1; b < views; ++b) pairs.push_back({a, b});
   }
   return pairs;
 }
@@ -164,7 +180,9 @@ Result<SymmetryChoice> choose_elements(const ComparedViews& views, std::span<con
       if (context.cancelled()) return;
       const int a = static_cast<int>(pair.a), b = static_cast<int>(pair.b);
       const Pose b_from_a = views.aligned(a, b, poses[pair.b].inverse(Eigen::Isometry) * element * poses[pair.a]);
-      pair.evidence.push_back(views.difference(a, b, b_from_a).evidence);
+      const ViewDifference difference = views.difference(a, b, b_from_a);
+      pair.evidence.push_back(difference.evidence);
+      pair.compared.push_back(difference.compared);
     }
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "cancelled while a symmetric part's scans were compared");

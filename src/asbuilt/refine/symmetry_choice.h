@@ -19,7 +19,8 @@ struct SymmetryChoice {
 /// CAD. So the elements of all views are chosen jointly, such that the surfaces of all pairs differ least
 /// (ViewDifference::evidence, each pair fitted to one another first): best placements view by view, the clearest first,
 /// from each view as reference, then changed one at a time until nothing improves. An element is decided if every other
-/// one, the rest following, is worse by more than 15 and by more than what differs at the best. Views for which nothing
+/// one, the rest following, is worse by more than 15 and by more than what differs at the best, and lets the view share
+/// at most twice as many patches with the others: where views do not meet, nothing differs. Views for which nothing
 /// breaks the symmetry are not decided, whatever their element.
 ///
 /// `elements`: a finite group, identity first (model::SymmetryGroup::elements). Pairs: all of up to 16 views, else the

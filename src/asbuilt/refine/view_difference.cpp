@@ -20,13 +20,16 @@ constexpr double kPatchRatio = 0.05, kReachRatio = 0.03;  // of the diameter
 constexpr double kFacing = 0.7, kAsideInSpacings = 1.5;
 constexpr double kProbesAcross = 4.0;  // of a patch, at least
 constexpr int kFewestInPatch = 8;
-constexpr double kPoseErrorInSigmas = 1.0;     // what refinement and calibration may leave of a patch's mean
+constexpr double kPoseErrorInSigmas = 0.4;     // what refinement and calibration may leave of a patch's mean
 constexpr double kDiffers = 3.0, kMost = 8.0;  // in standard deviations; no single patch decides everything
 constexpr std::size_t kFewestCompared = 30;
 constexpr int kAlignmentSteps = 4;
 constexpr double kTukeyTuning = 4.685;
 constexpr double kFirmlyHeld = 0.01;  // information of a direction, of what every match holding it fully would give
-constexpr double kTimesWithin = 4.0, kMoreThanWithin = 0.05;
+// Two individuals differ between each other so much more often than within. Groups are chosen so that they differ, and
+// where few patches were compared within them, none that differs says little.
+constexpr double kTimesWithin = 4.0, kMoreThanWithin = 0.01, kUnseenWithin = 2.0;
+constexpr double kProof = 50.0;  // log-likelihood: several patches
 
 double squared(double x) { return x * x; }
 
@@ -175,19 +178,153 @@ Pose ComparedViews::aligned(int a, int b, const Pose& b_from_a) const {
 
 namespace {
 
-using Table = std::vector<std::vector<ViewDifference>>;  // between groups, by place
+using Table = std::vector<std::vector<ViewDifference>>;  // between views, by place
+using Sides = std::vector<char>;                         // 0 or 1, one a view
 
-// Puts group b into group a.
-void merge(std::vector<std::vector<int>>& groups, Table& between, std::size_t a, std::size_t b) {
-  groups[a].insert(groups[a].end(), groups[b].begin(), groups[b].end());
-  groups.erase(groups.begin() + static_cast<std::ptrdiff_t>(b));
-  for (std::size_t g = 0; g < between.size(); ++g) {
-    if (g == a || g == b) continue;
-    between[a][g] += between[b][g];
-    between[g][a] = between[a][g];
+constexpr double kUsualShare = 0.05;  // of the patches of two individuals that differ
+constexpr double kDecisive = 15.0;    // log-likelihood
+
+ViewDifference across(const Table& between, const Sides& sides, bool same) {
+  ViewDifference sum;
+  for (std::size_t a = 0; a < sides.size(); ++a) {
+    for (std::size_t b = a + 1; b < sides.size(); ++b) {
+      if ((sides[a] == sides[b]) == same) sum += between[a][b];
+    }
   }
-  between.erase(between.begin() + static_cast<std::ptrdiff_t>(b));
-  for (auto& row : between) row.erase(row.begin() + static_cast<std::ptrdiff_t>(b));
+  return sum;
+}
+
+// How much more likely two views show two individuals than one, if patches of two differ in `share` of the cases.
+double apart(const ViewDifference& pair, double share) {
+  return pair.evidence - share * static_cast<double>(pair.compared - pair.differing);
+}
+
+// By how much it speaks against the side of a view that it shows the same as the others there.
+double gain_of_moving(std::size_t view, const Table& between, const Sides& sides, double share) {
+  double gain = 0.0;
+  for (std::size_t other = 0; other < sides.size(); ++other) {
+    if (other == view) continue;
+    gain += (sides[other] == sides[view] ? 1.0 : -1.0) * apart(between[view][other], share);
+  }
+  return gain;
+}
+
+double score(const Table& between, const Sides& sides, double share) {
+  double sum = 0.0;
+  for (std::size_t a = 0; a < sides.size(); ++a) {
+    for (std::size_t b = a + 1; b < sides.size(); ++b) {
+      if (sides[a] != sides[b]) sum += apart(between[a][b], share);
+    }
+  }
+  return sum;
+}
+
+// Moves views, but for those `kept`, one by one or two at a time, for as long as that makes the sides more likely. Two
+// views that differ change places together: alone, each would lie beside the other.
+void improve(const Table& between, Sides& sides, double share, std::span<const std::size_t> kept = {}) {
+  constexpr double kLeast = 1e-9;
+  const std::size_t count = sides.size();
+  const auto is_kept = [&](std::size_t view) { return std::ranges::find(kept, view) != kept.end(); };
+  std::vector<double> gains(count);
+  for (std::size_t moves = 0; moves < 10 * count; ++moves) {
+    for (std::size_t view = 0; view < count; ++view) gains[view] = gain_of_moving(view, between, sides, share);
+    std::size_t best = 0, with = 0;
+    double most = kLeast;
+    for (std::size_t a = 0; a < count; ++a) {
+      if (is_kept(a)) continue;
+      if (gains[a] > most) {
+        most = gains[a];
+        best = with = a;
+      }
+      for (std::size_t b = a + 1; b < count; ++b) {
+        if (sides[a] == sides[b] || between[a][b].differing == 0 || is_kept(b)) continue;
+        const double both = gains[a] + gains[b] + 2.0 * apart(between[a][b], share);
+        if (both <= most) continue;
+        most = both;
+        best = a;
+        with = b;
+      }
+    }
+    if (most == kLeast) return;
+    sides[best] = static_cast<char>(1 - sides[best]);
+    if (with != best) sides[with] = static_cast<char>(1 - sides[with]);
+  }
+}
+
+// The others follow the two views `a` and `b`, the clearest first.
+Sides around(std::size_t a, std::size_t b, const Table& between, double share) {
+  constexpr char kOpen = 2;
+  Sides sides(between.size(), kOpen);
+  sides[a] = 0;
+  sides[b] = 1;
+  for (std::size_t placed = 2; placed < sides.size(); ++placed) {
+    std::size_t clearest = 0;
+    double most = -1.0, for_second = 0.0;
+    for (std::size_t view = 0; view < sides.size(); ++view) {
+      if (sides[view] != kOpen) continue;
+      double lead = 0.0;
+      for (std::size_t other = 0; other < sides.size(); ++other) {
+        if (sides[other] == kOpen) continue;
+        lead += (sides[other] == 0 ? 1.0 : -1.0) * apart(between[view][other], share);
+      }
+      if (std::abs(lead) <= most) continue;
+      most = std::abs(lead);
+      clearest = view;
+      for_second = lead;
+    }
+    sides[clearest] = for_second > 0.0 ? 1 : 0;
+  }
+  return sides;
+}
+
+// Views of which it is known on which side they are, that of the view that differs most from others being given: views
+// that meet the rest only where both individuals are alike may be on either.
+std::vector<char> decided(const Table& between, const Sides& sides) {
+  std::vector<double> evidence(sides.size(), 0.0);
+  for (std::size_t a = 0; a < sides.size(); ++a) {
+    for (std::size_t b = 0; b < sides.size(); ++b) evidence[a] += between[a][b].evidence;
+  }
+  const auto reference = static_cast<std::size_t>(std::ranges::max_element(evidence) - evidence.begin());
+  const double most = score(between, sides, kUsualShare);
+  std::vector<char> known(sides.size(), 1);
+  for (std::size_t view = 0; view < sides.size(); ++view) {
+    if (view == reference) continue;
+    Sides other = sides;
+    other[view] = static_cast<char>(1 - other[view]);
+    const std::array<std::size_t, 2> kept = {reference, view};
+    improve(between, other, kUsualShare, kept);
+    known[view] = most - score(between, other, kUsualShare) >= kDecisive ? 1 : 0;
+  }
+  return known;
+}
+
+// The likeliest two sides: grown from each of the pairs that differ most, then changed view by view. How often patches
+// of two individuals differ is learnt on the way.
+Sides likeliest_sides(const Table& between) {
+  constexpr std::size_t kMostStarts = 12;
+  constexpr int kRounds = 3;
+  constexpr double kLeastShare = 0.005;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t a = 0; a < between.size(); ++a) {
+    for (std::size_t b = a + 1; b < between.size(); ++b) pairs.emplace_back(a, b);
+  }
+  std::ranges::stable_sort(pairs, std::ranges::greater{},
+                           [&](const auto& pair) { return between[pair.first][pair.second].evidence; });
+  Sides best(between.size(), 0);
+  double most = 0.0;
+  for (std::size_t start = 0; start < std::min(kMostStarts, pairs.size()); ++start) {
+    double share = kUsualShare;
+    Sides sides = around(pairs[start].first, pairs[start].second, between, share);
+    for (int round = 0; round < kRounds; ++round) {
+      improve(between, sides, share);
+      share = std::max(kLeastShare, across(between, sides, false).share());
+    }
+    const double found = score(between, sides, kUsualShare);
+    if (found <= most) continue;
+    most = found;
+    best = sides;
+  }
+  return best;
 }
 
 }  // namespace
@@ -199,46 +336,39 @@ Result<std::optional<Individuals>> two_individuals(const ComparedViews& views, s
   parallel_for(context, links.size(), 1, [&](std::size_t l) {
     if (context.cancelled()) return;
     const auto a = static_cast<std::size_t>(links[l].first), b = static_cast<std::size_t>(links[l].second);
-    found[l] = views.difference(links[l].first, links[l].second, poses[b].inverse(Eigen::Isometry) * poses[a]);
+    // Two individuals blended by a refinement are nowhere where they belong; only a pair fitted to one another shows
+    // what differs in shape.
+    const Pose b_from_a = views.aligned(links[l].first, links[l].second, poses[b].inverse(Eigen::Isometry) * poses[a]);
+    found[l] = views.difference(links[l].first, links[l].second, b_from_a);
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "cancelled while the scans were compared");
 
   const auto count = static_cast<std::size_t>(views.count());
-  std::vector<std::vector<int>> groups(count);
   Table between(count, std::vector<ViewDifference>(count));
-  ViewDifference all;
-  for (std::size_t v = 0; v < count; ++v) groups[v] = {static_cast<int>(v)};
   for (std::size_t l = 0; l < links.size(); ++l) {
     const auto a = static_cast<std::size_t>(links[l].first), b = static_cast<std::size_t>(links[l].second);
     between[a][b] = between[b][a] = found[l];
-    all += found[l];
   }
-  while (groups.size() > 2) {
-    std::size_t best_a = 0, best_b = 0;
-    double least = 2.0;
-    for (std::size_t a = 0; a < groups.size(); ++a) {
-      for (std::size_t b = a + 1; b < groups.size(); ++b) {
-        if (between[a][b].compared < kFewestCompared || between[a][b].share() >= least) continue;
-        least = between[a][b].share();
-        best_a = a;
-        best_b = b;
-      }
-    }
-    if (best_a == best_b) return std::optional<Individuals>();  // what is left shares too little
-    merge(groups, between, best_a, best_b);
+  const Sides sides = likeliest_sides(between);
+  std::array<std::vector<int>, 2> groups;
+  std::vector<int> undecided;
+  const std::vector<char> known = decided(between, sides);
+  for (std::size_t v = 0; v < count; ++v) {
+    (known[v] != 0 ? groups[static_cast<std::size_t>(sides[v])] : undecided).push_back(static_cast<int>(v));
   }
-  const ViewDifference& across = between[0][1];
-  if (across.compared < kFewestCompared || groups[0].size() < 2 || groups[1].size() < 2) {
+  if (groups[0].size() < 2 || groups[1].size() < 2) return std::optional<Individuals>();
+  const ViewDifference differences = across(between, sides, false), within = across(between, sides, true);
+  const double often_within =
+      (static_cast<double>(within.differing) + kUnseenWithin) / std::max(1.0, static_cast<double>(within.compared));
+  if (differences.compared < kFewestCompared || differences.evidence < kProof ||
+      differences.share() <= kTimesWithin * often_within + kMoreThanWithin) {
     return std::optional<Individuals>();
   }
-  ViewDifference within = all;
-  within.compared -= across.compared;
-  within.differing -= across.differing;
-  if (across.share() <= kTimesWithin * within.share() + kMoreThanWithin) return std::optional<Individuals>();
-  for (auto& group : groups) std::ranges::sort(group);
-  const bool swap = std::pair(groups[1].size(), -groups[1][0]) > std::pair(groups[0].size(), -groups[0][0]);
-  Individuals individuals{groups[swap ? 1 : 0], groups[swap ? 0 : 1], across.share(), within.share(), 0.0};
-  individuals.height_mm = across.height_mm / static_cast<double>(across.differing);
+  if (groups[1].size() > groups[0].size() || (groups[1].size() == groups[0].size() && groups[1][0] < groups[0][0])) {
+    std::swap(groups[0], groups[1]);
+  }
+  Individuals individuals{groups[0], groups[1], undecided, differences.share(), within.share(), 0.0};
+  individuals.height_mm = differences.height_mm / static_cast<double>(differences.differing);
   return std::optional(std::move(individuals));
 }
 

@@ -64,16 +64,18 @@ class ComparedViews {
 
 /// Views that show different individuals, two castings of one CAD in one pile of scans.
 struct Individuals {
-  std::vector<int> first, second;  ///< views, ascending; `first` has more of them (or holds view 0)
+  std::vector<int> first, second;  ///< views, ascending; `first` has more of them (or the first of all)
+  std::vector<int> undecided;      ///< views that may show either: they meet the others only where both are alike
   double share_between = 0.0;      ///< of the patches that views of both measured: differing
   double share_within = 0.0;       ///< the same among views of one individual
   double height_mm = 0.0;          ///< usual distance where they differ
 };
 
-/// Splits the linked views into two individuals if their surfaces say so: grouped by average linkage, from the views
-/// that differ least, until two groups are left; believed if each has two views, and patches between the groups differ
-/// four times as often as within and in one case of twenty more. Views that share nothing decide nothing. nullopt: one
-/// individual, or fewer than four views. Errors: cancelled.
+/// Splits the linked views into two individuals if their surfaces say so: each pair is fitted to one another first; the
+/// sides are those under which what differs and what does not is likeliest; believed if each has two views, and patches
+/// of different sides differ four times as often as those of one and in one case of a hundred more, several of them
+/// decisively. Views that share nothing decide nothing. nullopt: one individual, or fewer than four views. Errors:
+/// cancelled.
 [[nodiscard]] Result<std::optional<Individuals>> two_individuals(const ComparedViews& views,
                                                                  std::span<const Pose> poses,
                                                                  std::span<const Link> links, const Context& context);
