@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Raw bytes to the live server over a socket, as anybody on the machine can send them. The server must answer each with
-// a status line or none, write nothing but files with the names of scans into the watched folder and nothing outside of
-// it, and go on.
+// Raw bytes to the live server over a socket, as anybody on the machine can send them; after a first byte that says to
+// which of two servers: 't' to one that asks for a token, anything else to one that does not. Each must answer with a
+// status line or none, let nobody in who did not name this machine or has no token, write nothing but files with the
+// names of scans into the watched folder and nothing outside of it, and go on.
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -25,6 +29,8 @@ namespace {
 namespace fs = std::filesystem;
 namespace viewer = asbuilt::viewer;
 
+constexpr std::uintmax_t kLargestUpload = 2048;
+
 [[noreturn]] void complain(std::string_view what) {
   std::cerr << what << '\n';
   std::abort();
@@ -33,7 +39,9 @@ namespace viewer = asbuilt::viewer;
 /// A server with a state that never changes, over a folder of its own: BASE/watched.
 class Target {
  public:
-  Target() {
+  explicit Target(const std::string& token)
+      : base_(fs::temp_directory_path() /
+              fmt::format("asbuilt-fuzz-http-{}{}", ::getpid(), token.empty() ? "" : "-guarded")) {
     fs::create_directories(watched());
     std::ofstream(base_ / "beside.ply") << "beside";
     const auto constant = [](const char* text) { return [text] { return std::string(text); }; };
@@ -42,7 +50,8 @@ class Target {
                             constant(R"({"schema":1})"), R"({"schema":1})"};
     viewer::ServerOptions options;
     options.port = 0;
-    options.largest_upload = 2048;
+    options.largest_upload = kLargestUpload;
+    options.token = token;
     const auto known = [](const std::string& file) { return file == "known.ply"; };
     auto server = viewer::Server::start(std::move(content), watched(), options, {known, known, [] {}});
     if (!server) complain(server.error().message);
@@ -57,7 +66,7 @@ class Target {
   [[nodiscard]] std::string answer_to(std::string_view bytes) const {
     const int connection = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connection < 0) complain("no socket");
-    const timeval patience{20, 0};
+    const timeval patience{4, 0};
     ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -74,12 +83,13 @@ class Target {
     ::shutdown(connection, SHUT_WR);
     std::string answer;
     std::array<char, 4096> block;
-    for (ssize_t got = 0; (got = ::recv(connection, block.data(), block.size(), 0)) > 0;) {
+    // Events come for ever: the present state is enough.
+    while (answer.find("\nevent: state\n") == std::string::npos) {
+      const ssize_t got = ::recv(connection, block.data(), block.size(), 0);
+      if (got < 0 && errno == EAGAIN) complain("the server does not answer");
+      if (got <= 0) break;
       answer.append(block.data(), static_cast<std::size_t>(got));
-      // Events come for ever: the present state is enough.
-      if (answer.find("\nevent: state\n") != std::string::npos) break;
     }
-    if (errno == EAGAIN) complain("the server does not answer");
     ::close(connection);
     server_->state_changed();  // those that listened notice that nobody is there
     return answer;
@@ -96,7 +106,7 @@ class Target {
     for (const auto& entry : fs::directory_iterator(watched())) {
       const std::string file = entry.path().filename().string();
       if (!entry.is_regular_file() || !asbuilt::live::is_scan_name(file)) complain("left behind: " + file);
-      if (entry.file_size() == 0 || entry.file_size() > 2048) complain("an upload of another size than allowed");
+      if (entry.file_size() == 0 || entry.file_size() > kLargestUpload) complain("an upload of another size than allowed");
       fs::remove(entry.path());
     }
   }
@@ -104,12 +114,14 @@ class Target {
  private:
   [[nodiscard]] fs::path watched() const { return base_ / "watched"; }
 
-  fs::path base_ = fs::temp_directory_path() / ("asbuilt-fuzz-http-" + std::to_string(::getpid()));
+  fs::path base_;
   std::unique_ptr<viewer::Server> server_;
 };
 
+constexpr std::string_view kVersion = "HTTP/1.1 ";
+constexpr std::size_t kStatusAt = kVersion.size();
+
 bool is_status_line(std::string_view answer) {
-  constexpr std::string_view kVersion = "HTTP/1.1 ";
   if (!answer.starts_with(kVersion) || answer.size() < kVersion.size() + 4) return false;
   for (std::size_t i = 0; i < 3; ++i) {
     if (std::isdigit(static_cast<unsigned char>(answer[kVersion.size() + i])) == 0) return false;
@@ -117,12 +129,27 @@ bool is_status_line(std::string_view answer) {
   return answer[kVersion.size()] >= '1' && answer[kVersion.size()] <= '5';
 }
 
+/// Whether a request says anywhere that it is for this machine: what lets it pass must at least be in it.
+bool names_this_machine(std::string_view request) {
+  std::string lower(request);
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto has = [&](std::string_view word) { return lower.find(word) != std::string::npos; };
+  return has("host") && (has("localhost") || has("127.0.0.1") || has("::1"));
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Target target;
-  const std::string answer = target.answer_to({reinterpret_cast<const char*>(data), size});
+  static const Target open{""}, guarded{"0f5a71c3e9d24b8861b7"};
+  if (size == 0) return 0;
+  const bool is_guarded = data[0] == 't';
+  const std::string_view request(reinterpret_cast<const char*>(data) + 1, size - 1);
+  const Target& target = is_guarded ? guarded : open;
+  const std::string answer = target.answer_to(request);
   if (!answer.empty() && !is_status_line(answer)) complain("no HTTP: " + answer.substr(0, 100));
+  const bool let_in = answer.size() > kStatusAt && answer[kStatusAt] == '2';
+  if (let_in && is_guarded) complain("let in without the token");
+  if (let_in && !names_this_machine(request)) complain("let in from elsewhere");
   target.check_folder();
   return 0;
 }

@@ -9,8 +9,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "asbuilt/live/scan_store.h"
 #include "fuzz/seeds.h"
@@ -42,16 +45,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   write(scan / "live.json", data[0] == 's' ? content : asbuilt::test::kSensorSeed);
   write(scan / "result.json", data[0] == 'd' ? content : asbuilt::test::kRecordSeed);
   std::vector<std::string> lost;
-  auto store = ScanStore::open(base, lost);
-  if (!store) {
-    if (store.error().message.find("live.json") == std::string::npos) complain("an error that names no file");
+  asbuilt::Result<ScanStore> opened = ScanStore::open(base, lost);
+  if (!opened) {
+    if (opened.error().message.find("live.json") == std::string::npos) complain("an error that names no file");
     return 0;
   }
+  std::optional<ScanStore> store(std::move(*opened));
   if (store->files().size() + lost.size() != 1) complain("the scan was neither read nor told to be lost");
   if (fs::exists(scan) != lost.empty()) complain("what is lost must go, what is read must stay");
   // What was read can be written, and reads the same again.
   const auto removed = store->removed();
   if (!store->set_removed("b.ply", "0")) complain("cannot be written");
+  store.reset();  // the folder is that of one store at a time
   lost.clear();
   const auto again = ScanStore::open(base, lost);
   if (!again || !lost.empty()) complain("what was written cannot be read");

@@ -131,10 +131,10 @@ inline constexpr const char* kRecordSeed = R"({"asbuilt": {"version": "0.1.0", "
 "score": 0.9, "visible_share": 0.2, "free_space_violations": 0, "normal_agreement": 1, "margin": 0.1, "candidates": [],
 "segment_points": 0, "warnings": ["w"]}]})";
 
-/// A request as it comes over the wire.
+/// A request as it comes over the wire, after the letter of the server that it goes to.
 inline std::string http_seed(const std::string& method, const std::string& target, const std::string& more = {},
-                             const std::string& body = {}) {
-  return method + " " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n" + body;
+                             const std::string& body = {}, char server = 'o') {
+  return server + method + " " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n" + body;
 }
 
 inline std::vector<Seed> seeds() {
@@ -179,8 +179,15 @@ inline std::vector<Seed> live_seeds() {
       {"state", "sensor.json", std::string("s") + kSensorSeed},
       {"state", "record.json", std::string("d") + kRecordSeed},
       {"http", "state", http_seed("GET", "/state")},
-      {"http", "events", http_seed("GET", "/events?token=x", "Origin: http://localhost\r\n")},
-      {"http", "values", http_seed("GET", "/surface/values?revision=1", "Authorization: Bearer x\r\n")},
+      {"http", "elsewhere", "oGET /state HTTP/1.1\r\nHost: a.example\r\n\r\n"},
+      {"http", "events", http_seed("GET", "/events", "Origin: http://localhost\r\n")},
+      {"http", "values", http_seed("GET", "/surface/values?revision=1", "Authorization: Bearer x\r\n", "", 't')},
+      {"http", "token", http_seed("GET", "/state?token=0f5a", "", "", 't')},
+      {"http", "guarded_upload",
+       http_seed("POST", "/scans?name=e.ply&token=x", "Content-Length: 4\r\n", "ply\n", 't')},
+      {"http", "traversal", http_seed("POST", "/scans?name=..%2Fbeside.ply", "Content-Length: 4\r\n", "ply\n")},
+      {"http", "two_requests",
+       http_seed("GET", "/nothing", "Content-Length: 40\r\n", "DELETE /scans/known.ply HTTP/1.1\r\nHost: a\r\n\r\n")},
       {"http", "upload", http_seed("POST", "/scans?name=a%20b.ply", "Content-Length: 5\r\n", "ply\n0")},
       {"http", "chunked",
        http_seed("POST", "/scans?name=c.xyz", "Transfer-Encoding: chunked\r\n", "3\r\n1 2\r\n0\r\n\r\n")},
