@@ -15,6 +15,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -34,6 +35,15 @@ constexpr std::uintmax_t kLargestUpload = 2048;
 [[noreturn]] void complain(std::string_view what) {
   std::cerr << what << '\n';
   std::abort();
+}
+
+template <class Call>
+ssize_t uninterrupted(const Call& call) {
+  ssize_t result = 0;
+  do {
+    result = call();
+  } while (result < 0 && errno == EINTR);
+  return result;
 }
 
 /// A server with a state that never changes, over a folder of its own: BASE/watched.
@@ -64,19 +74,9 @@ class Target {
 
   /// Sends the bytes and gives back what comes until the server closes, or enough of it.
   [[nodiscard]] std::string answer_to(std::string_view bytes) const {
-    const int connection = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (connection < 0) complain("no socket");
-    const timeval patience{4, 0};
-    ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(server_->port()));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-      complain("the server takes no connection any more");
-    }
+    const int connection = connected();
     while (!bytes.empty()) {
-      const ssize_t sent = ::send(connection, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      const ssize_t sent = uninterrupted([&] { return ::send(connection, bytes.data(), bytes.size(), MSG_NOSIGNAL); });
       if (sent <= 0) break;  // it has answered and closed
       bytes.remove_prefix(static_cast<std::size_t>(sent));
     }
@@ -85,7 +85,7 @@ class Target {
     std::array<char, 4096> block;
     // Events come for ever: the present state is enough.
     while (answer.find("\nevent: state\n") == std::string::npos) {
-      const ssize_t got = ::recv(connection, block.data(), block.size(), 0);
+      const ssize_t got = uninterrupted([&] { return ::recv(connection, block.data(), block.size(), 0); });
       if (got < 0 && errno == EAGAIN) complain("the server does not answer");
       if (got <= 0) break;
       answer.append(block.data(), static_cast<std::size_t>(got));
@@ -112,6 +112,35 @@ class Target {
   }
 
  private:
+  [[nodiscard]] int connected() const {
+    // A closed connection keeps its pair of ports for a minute: there are enough addresses, not enough ports.
+    static std::uint32_t connections = 0;
+    const sockaddr_in own = on_loopback(INADDR_LOOPBACK + ++connections % 4096, 0);
+    const sockaddr_in address = on_loopback(INADDR_LOOPBACK, static_cast<std::uint16_t>(server_->port()));
+    const timeval patience{4, 0};
+    const int yes = 1;
+    for (;;) {
+      const int connection = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      if (connection < 0) complain("no socket");
+      ::setsockopt(connection, IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, &yes, sizeof(yes));
+      ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+      if (::bind(connection, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) complain("no address");
+      if (::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0) return connection;
+      if (errno != EINTR) {  // the fuzzer's own clock
+        complain(fmt::format("the server takes no connection any more: {}", std::strerror(errno)));
+      }
+      ::close(connection);
+    }
+  }
+
+  static sockaddr_in on_loopback(std::uint32_t address, std::uint16_t port) {
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_addr.s_addr = htonl(address);
+    place.sin_port = htons(port);
+    return place;
+  }
+
   [[nodiscard]] fs::path watched() const { return base_ / "watched"; }
 
   fs::path base_;

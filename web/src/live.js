@@ -18,7 +18,11 @@ const sound = new Sound();
 let state = null;
 let chosen = null;
 
-const client = new LiveClient({ state: take, connection: (connection) => { banner.set_connection(connection); if (connection === 'open') load_surface(); } });
+const client = new LiveClient({ state: take, connection: (connection) => {
+  banner.set_connection(connection);
+  if (connection === 'lost') values.forget();
+  if (connection === 'open') load_surface();
+} });
 const side = new Side({
   show_view: (i) => view.show_view(i), show_hole: (i) => view.show_hole(i), write_result: () => attempt(client.write_result()),
   restore: (file) => attempt(client.restore(file)), add: (files) => files.forEach((file) => attempt(client.add(file), `${file.name} is being sent`)),

@@ -22,8 +22,9 @@ namespace asbuilt::live {
 /// One sentence on what became of a scan; its links are looked up in the state.
 [[nodiscard]] std::string sentence_for(const LiveState& state, std::size_t scan);
 
-/// Level, text and no sound of the one big line. `latest` is the scan that came last, or -1.
-void set_now(LiveState& state, int latest);
+/// Level, headline and text of the one big line: a trouble first, then what became of the newest scan, then what to do.
+/// The text begins with the headline, which is short enough to be read from where the scanner stands.
+void set_now(LiveState& state);
 
 /// The directions in which a pose is held much worse than in the others, about `centre`, at most two.
 [[nodiscard]] std::vector<WeakDirection> weak_directions(const Matrix6d& covariance, const Eigen::Vector3d& centre,

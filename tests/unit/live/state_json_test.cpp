@@ -99,7 +99,8 @@ TEST(Words, AScanWithoutThePartSaysWhatIsKnownAndNoMore) {
   state.scans[0].record.name = "scan_03";
   state.scans[0].record.status = io::ScanStatus::rejected;
   state.scans[0].record.reason_code = "no_hypothesis";
-  set_now(state, 0);
+  state.newest = 0;
+  set_now(state);
   EXPECT_EQ(state.now_level, "bad");
   EXPECT_NE(state.now_text.find("not found"), std::string::npos);
   EXPECT_EQ(state.now_text.find("should be in view"), std::string::npos);

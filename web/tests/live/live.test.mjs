@@ -110,6 +110,20 @@ test('unscanned surface is orange stripes from the start', { timeout: kPatience 
   await close();
 });
 
+test('the axes of the words are shown, as the view turns them', { timeout: kPatience }, async () => {
+  const { tab, close } = await opened();
+  const places = () => tab.evaluate(() => { window.asbuilt.view.viewer.draw(); return Object.fromEntries([...document.querySelectorAll('.axes text')].map((text) => [text.textContent, [Number(text.getAttribute('x')), Number(text.getAttribute('y'))]])); });
+  const look_from = (x, y, z) => tab.evaluate((from) => { const { viewer } = window.asbuilt.view; viewer.orbit.look_along({ x: from[0], y: from[1], z: from[2], length: () => Math.hypot(...from) }); }, [x, y, z]);
+  await look_from(0, -1, 0);
+  let at = await places();
+  assert.equal(Object.keys(at).length, 6);
+  assert.ok(at['+x'][0] > 30 && at['\u2212x'][0] < -30 && at['+z'][1] < -30 && Math.abs(at['+z'][0]) < 1, JSON.stringify(at));
+  await look_from(1, 0, 0);
+  at = await places();
+  assert.ok(at['+y'][0] > 30 && at['\u2212y'][0] < -30, JSON.stringify(at));
+  await close();
+});
+
 test('a rejected scan is told by line, colour and frame', { timeout: kPatience }, async () => {
   const { tab, close } = await opened();
   show(2);
@@ -142,10 +156,14 @@ test('a program that starts anew counts from one again and is believed', { timeo
   const { tab, close } = await opened();
   show(5, { revision: 400 });
   await revision_is(tab, 400);
+  await values_are(tab, 5);
+  const asked = () => server.requests.filter((request) => request === 'GET /surface/values').length;
+  const before = asked();
   await server.stop();
-  show(5, { revision: 2 });
+  show(5, { revision: 2 });  // its values have the number of the old ones by chance
   await server.start();
   await revision_is(tab, 2);
+  while (asked() === before) await new Promise((resolve) => setTimeout(resolve, 20));
   await close();
 });
 

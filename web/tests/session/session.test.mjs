@@ -64,7 +64,18 @@ test('from the first scan over two pieces and a scan without the part to one pie
     put(name);
     return tab.locator('.strip li', { has: tab.locator('b', { hasText: name }) }).getAttribute('data-status');
   };
-  const at_rest = () => tab.waitForFunction(() => /^Waiting/.test(document.getElementById('phase').textContent));
+  /** Nothing is judged or refined any more, and the picture shows what the state says. */
+  const at_rest = async () => {
+    for (;;) {
+      await tab.waitForFunction(() => /^Waiting/.test(document.getElementById('phase').textContent));
+      const state = await (await fetch(`${url}state`)).json();
+      if (state.phase === 'waiting' && state.refinement.state === 'done') {
+        await tab.waitForFunction((wanted) => window.asbuilt.view.revision === wanted, state.surface_revision);
+        return state;
+      }
+      await new Promise((resolve) => setTimeout(resolve, 100));
+    }
+  };
   assert.match(await now(), /^Take the first scan/);
 
   // Two scans from the most different sides have too little in common, whatever else there is.
@@ -94,6 +105,7 @@ test('from the first scan over two pieces and a scan without the part to one pie
   const before_absent = await covered();
   assert.equal(await scan(absent), 'rejected');
   await tab.waitForSelector('.banner[data-level=bad]');
+  await at_rest();
   assert.match(await now(), new RegExp(`^${absent} is not used: the part was not found in it`));
   assert.equal(await covered(), before_absent);
   await picture('live-absent');
@@ -104,16 +116,20 @@ test('from the first scan over two pieces and a scan without the part to one pie
   for (const name of rest) assert.equal(await scan(name), 'accepted');
   await tab.waitForSelector('.pieces:not(.apart)');
   await tab.waitForFunction((count) => document.querySelector('.pieces').textContent.includes(`Joined: all ${count} scans hang together`), usable.length);
-  await tab.waitForFunction(() => window.asbuilt.client && /^Waiting/.test(document.getElementById('phase').textContent));
+  const state = await at_rest();
   assert.ok(await covered() > before_absent + 2);
   assert.match(await now(), /^Next: from /);
   const { drawn, colours } = await canvas_figures(tab);
   assert.ok(drawn > 0.02 && colours > 4, `${drawn}, ${colours}`);
-  const state = await (await fetch(`${url}state`)).json();
   assert.equal(state.pieces.length, 1);
   assert.equal(state.scans.filter((each) => each.status === 'accepted').length, usable.length);
-  await tab.waitForTimeout(300);
   await picture('live-joined');
+
+  // A press on the first proposal turns the view so that its ghost can be seen.
+  await tab.click('.next li:first-child');
+  await tab.waitForFunction(() => { const ghost = [...document.querySelectorAll('.sensor.ghost')].find((each) => each.textContent === 'A'); return ghost && !ghost.hidden && !ghost.classList.contains('beyond'); });
+  await tab.waitForTimeout(700);  // the flight there
+  await picture('live-next');
   assert.deepEqual(faults, []);
   await close();
 });
