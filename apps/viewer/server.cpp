@@ -10,6 +10,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -106,9 +107,12 @@ struct Server::Implementation {
       answer(response, refused->status, refused->reason);
       return httplib::Server::HandlerResponse::Handled;
     });
-    http.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+    http.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
       if (!response.body.empty()) return;
       const int status = response.status;
+      if (status == 400 && request.method == "POST" && !request.has_header("Content-Length")) {
+        return answer(response, status, "a POST needs its Content-Length, be it 0");
+      }
       answer(response, status,
              status == 404   ? "there is nothing under this name (docs/live-protocol.md lists what there is)"
              : status == 413 ? "the request is too large"
@@ -204,6 +208,9 @@ struct Server::Implementation {
     if (!request.has_header("Content-Length") && request.get_header_value("Transfer-Encoding") != "chunked") {
       return refuse(400, "the request has no length");
     }
+    // The library would read all of it first, only to throw it away.
+    const std::uint64_t announced = std::strtoull(request.get_header_value("Content-Length").c_str(), nullptr, 10);
+    if (announced > options.largest_upload) return refuse(413, "the file is too large");
     Upload upload(watched, file);
     const bool whole = body([&](const char* data, std::size_t size) {
       return upload.bytes() + size <= options.largest_upload && upload.append(data, size);

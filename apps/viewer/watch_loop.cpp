@@ -22,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 using live::FileEvent;
 
 constexpr std::chrono::milliseconds kPoll{100}, kRetry{3000}, kRetryWithoutRoom{60000};
-constexpr std::uintmax_t kLittleRoom = 64U << 20U;
+constexpr std::uintmax_t kLittleRoom = 64U << 20U, kNoRoom = 256U << 10U;
 
 std::uintmax_t room_in(const fs::path& folder) {
   std::error_code error;
@@ -112,6 +112,7 @@ class Loop {
   void work() {
     auto last_task = Clock::now();
     while (!stop_.stop_requested()) {
+      if (watched_is_full_) tell_of_watched_disk();
       if (auto task = inbox_.take(kPoll)) {
         task();
         last_task = Clock::now();
@@ -145,6 +146,7 @@ class Loop {
       done = session_.add((options_.watch / event.file).string());
     }
     if (stop_.stop_requested()) return;
+    tell_of_watched_disk();
     if (!done && event.kind == FileEvent::Kind::ready) {
       waiting_.insert(event.file);
       last_failure_ = Clock::now();
@@ -175,10 +177,27 @@ class Loop {
     if (waiting_.empty()) return session_.end_trouble("storing");
     const std::string who =
         waiting_.size() == 1 ? *waiting_.begin() + " waits" : fmt::format("{} files wait", waiting_.size());
-    const bool is_full = room_at_failure_ < kLittleRoom;
-    session_.set_trouble(
-        "storing", {fmt::format("{}: {}.", is_full ? "The disk is full" : "The session's folder cannot be written", who),
-                    fmt::format("{}. Nothing is lost: make room and it goes on by itself.", why_waiting_)});
+    if (room_at_failure_ < kLittleRoom) {
+      session_.set_trouble(
+          "storing",
+          {fmt::format("The disk is full: {}.", who),
+           fmt::format("Make room on the disk of {} and it goes on by itself; nothing is lost.", output_.string())});
+    } else {
+      session_.set_trouble("storing", {fmt::format("The session's folder cannot be written: {}.", who),
+                                       fmt::format("{}. It is tried again; nothing is lost.", why_waiting_)});
+    }
+  }
+
+  /// The file that filled it was cut short by whoever wrote it.
+  void tell_of_watched_disk() {
+    std::error_code error;
+    if (!fs::exists(options_.watch, error)) return;
+    const bool is_full = room_in(options_.watch) < kNoRoom;
+    if (is_full == watched_is_full_) return;
+    watched_is_full_ = is_full;
+    if (!is_full) return session_.end_trouble("watched disk");
+    session_.set_trouble("watched disk", {"The disk of the watched folder is full.",
+                                          "The last scan may have been cut short: make room and save it again."});
   }
 
   void tell_of_folder(bool lost) {
@@ -206,7 +225,7 @@ class Loop {
     }
     inbox_.put([this, file] {
       const auto done = session_.take_out(file);
-      if (!done) session_.note("bad", file, done.error().message);
+      if (!done) session_.note("bad", file, fmt::format("{} could not be taken out: {}", file, done.error().message));
     });
     return true;
   }
@@ -216,7 +235,9 @@ class Loop {
     if (std::ranges::find(state->removed, file) == state->removed.end()) return false;
     inbox_.put([this, file] {
       const auto done = session_.restore(file);
-      if (!done) return session_.note("bad", file, done.error().message);
+      if (!done) {
+        return session_.note("bad", file, fmt::format("{} could not be taken in: {}", file, done.error().message));
+      }
       take({FileEvent::Kind::ready, file});
     });
     return true;
@@ -235,6 +256,7 @@ class Loop {
   std::set<std::string> waiting_, was_waiting_;  // files that could not be stored; those that the page tells of
   std::string why_waiting_;
   std::uintmax_t room_at_failure_ = 0;
+  bool watched_is_full_ = false;
   Clock::time_point last_failure_;
 };
 

@@ -106,7 +106,8 @@ class Target {
     for (const auto& entry : fs::directory_iterator(watched())) {
       const std::string file = entry.path().filename().string();
       if (!entry.is_regular_file() || !asbuilt::live::is_scan_name(file)) complain("left behind: " + file);
-      if (entry.file_size() == 0 || entry.file_size() > kLargestUpload) complain("an upload of another size than allowed");
+      if (entry.file_size() == 0 || entry.file_size() > kLargestUpload)
+        complain("an upload of another size than allowed");
       fs::remove(entry.path());
     }
   }

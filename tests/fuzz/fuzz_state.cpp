@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,9 +27,36 @@ using asbuilt::live::ScanStore;
   std::abort();
 }
 
-void write(const fs::path& path, std::string_view content) {
-  fs::create_directories(path.parent_path());
-  std::ofstream(path, std::ios::binary) << content;
+void write(const fs::path& path, std::string_view content) { std::ofstream(path, std::ios::binary) << content; }
+
+/// A session of one scan, of which one file at a time is replaced.
+class Session {
+ public:
+  Session() { fs::create_directories(base); }
+  ~Session() { fs::remove_all(base); }
+
+  void write_all() const {
+    fs::create_directories(scan);
+    write(base / "live.json", asbuilt::test::kRemovedSeed);
+    write(scan / "live.json", asbuilt::test::kSensorSeed);
+    write(scan / "result.json", asbuilt::test::kRecordSeed);
+  }
+
+  const fs::path base = fs::temp_directory_path() / ("asbuilt-fuzz-state-" + std::to_string(::getpid()));
+  const fs::path scan = base / "scans" / "a.ply";
+};
+
+/// What was read can be written, and reads the same again.
+void write_and_read_again(ScanStore store, const fs::path& base) {
+  const auto removed = store.removed();
+  if (!store.set_removed("b.ply", "0")) complain("cannot be written");
+  { const ScanStore let_go = std::move(store); }  // the folder is that of one store at a time
+  std::vector<std::string> lost;
+  const auto again = ScanStore::open(base, lost);
+  if (!again || !lost.empty()) complain("what was written cannot be read");
+  for (const auto& [file, sha256] : removed) {
+    if (file != "b.ply" && again->removed().at(file) != sha256) complain("another list than was written");
+  }
 }
 
 }  // namespace
@@ -38,30 +64,21 @@ void write(const fs::path& path, std::string_view content) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const std::string_view content(reinterpret_cast<const char*>(data) + 1, size - 1);
-  static const fs::path base = fs::temp_directory_path() / ("asbuilt-fuzz-state-" + std::to_string(::getpid()));
-  const fs::path scan = base / "scans" / "a.ply";
-  fs::remove_all(base);
-  write(base / "live.json", data[0] == 'r' ? content : asbuilt::test::kRemovedSeed);
-  write(scan / "live.json", data[0] == 's' ? content : asbuilt::test::kSensorSeed);
-  write(scan / "result.json", data[0] == 'd' ? content : asbuilt::test::kRecordSeed);
+  static const Session session;
+  session.write_all();
+  const char which = static_cast<char>(data[0]);
+  const fs::path replaced = which == 'r'   ? session.base / "live.json"
+                            : which == 's' ? session.scan / "live.json"
+                                           : session.scan / "result.json";
+  write(replaced, content);
   std::vector<std::string> lost;
-  asbuilt::Result<ScanStore> opened = ScanStore::open(base, lost);
+  asbuilt::Result<ScanStore> opened = ScanStore::open(session.base, lost);
   if (!opened) {
     if (opened.error().message.find("live.json") == std::string::npos) complain("an error that names no file");
     return 0;
   }
-  std::optional<ScanStore> store(std::move(*opened));
-  if (store->files().size() + lost.size() != 1) complain("the scan was neither read nor told to be lost");
-  if (fs::exists(scan) != lost.empty()) complain("what is lost must go, what is read must stay");
-  // What was read can be written, and reads the same again.
-  const auto removed = store->removed();
-  if (!store->set_removed("b.ply", "0")) complain("cannot be written");
-  store.reset();  // the folder is that of one store at a time
-  lost.clear();
-  const auto again = ScanStore::open(base, lost);
-  if (!again || !lost.empty()) complain("what was written cannot be read");
-  for (const auto& [file, sha256] : removed) {
-    if (file != "b.ply" && again->removed().at(file) != sha256) complain("another list than was written");
-  }
+  if (opened->files().size() + lost.size() != 1) complain("the scan was neither read nor told to be lost");
+  if (fs::exists(session.scan) != lost.empty()) complain("what is lost must go, what is read must stay");
+  if (which == 'r' && lost.empty()) write_and_read_again(std::move(*opened), session.base);
   return 0;
 }

@@ -106,5 +106,20 @@ TEST(Words, AScanWithoutThePartSaysWhatIsKnownAndNoMore) {
   EXPECT_EQ(state.now_text.find("should be in view"), std::string::npos);
 }
 
+TEST(Words, ATroubleComesBeforeAllElseUntilItIsOver) {
+  LiveState state;
+  set_now(state);
+  EXPECT_EQ(state.now_level, "act");
+  state.troubles["storing"] = {"The disk is full: a.ply waits.", "Make room."};
+  set_now(state);
+  EXPECT_EQ(state.now_level, "bad");
+  EXPECT_EQ(state.now_headline, "The disk is full: a.ply waits.");
+  EXPECT_EQ(state.now_text, "The disk is full: a.ply waits. Make room.");
+  state.troubles.clear();
+  set_now(state);
+  EXPECT_EQ(state.now_level, "act");
+  EXPECT_EQ(state.now_text, state.now_headline);
+}
+
 }  // namespace
 }  // namespace asbuilt::live

@@ -26,13 +26,18 @@ export class Axes {
     const said = seen.map(({ at }) => `${at.x.toFixed(2)} ${at.y.toFixed(2)}`).join();
     if (said === this.said) return;
     this.said = said;
-    for (const { at, line, text, group } of seen) {
+    const named = [];  // places of the names, the nearest first
+    for (const { at, line, text, group } of [...seen].reverse()) {
       const [x, y] = [kReach * at.x, -kReach * at.y];
       const length = Math.hypot(x, y) || 1;
+      const name = [x + (11 * x) / length, y + (11 * y) / length];
+      const is_covered = named.some((other) => Math.hypot(name[0] - other[0], name[1] - other[1]) < 20);
+      named.push(name);
       line.setAttribute('x2', x.toFixed(1));
       line.setAttribute('y2', y.toFixed(1));
-      text.setAttribute('x', (x + (11 * x) / length).toFixed(1));
-      text.setAttribute('y', (y + (11 * y) / length).toFixed(1));
+      text.setAttribute('x', name[0].toFixed(1));
+      text.setAttribute('y', name[1].toFixed(1));
+      text.setAttribute('visibility', is_covered ? 'hidden' : 'visible');
       group.setAttribute('class', at.z < 0 ? 'back' : '');
       line.setAttribute('class', at.z < 0 ? 'back' : '');
     }

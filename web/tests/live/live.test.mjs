@@ -131,7 +131,8 @@ test('a rejected scan is told by line, colour and frame', { timeout: kPatience }
   server.set(with_rejected_last(example_state(mesh, 3)));
   await tab.waitForSelector('.banner[data-level=bad]');
   await tab.waitForSelector('#page.flash-rejected');
-  assert.match(await now(tab), /scan_02 was not used: the part is not in it/);
+  assert.match(await now(tab), /^scan_02 was not used: the part is not in it\. Scan this side again\.$/);
+  assert.equal(await tab.textContent('#now .rest'), 'Scan this side again.');
   assert.equal(await tab.$$eval('.strip [data-status=rejected]', (list) => list.length), 1);
   await close();
 });
@@ -183,6 +184,15 @@ test('a scan is taken out after a second press, and brought back', { timeout: kP
   await tab.setInputFiles('.tools input', { name: 'scan 07.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\n') });
   while (server.posted.length < 4) await new Promise((resolve) => setImmediate(resolve));
   assert.deepEqual(server.posted.sort(), ['DELETE /scans/scan_01.ply', 'POST /result', 'POST /scans scan 07.ply', 'POST /scans/scan_01.ply/restore']);
+  await close();
+});
+
+test('trouble that somebody must deal with is told beside the notes, too', { timeout: kPatience }, async () => {
+  const { tab, close } = await opened();
+  show(2);
+  await revision_is(tab, 3);
+  show(2, { revision: 4, notes: [{ revision: 4, level: 'bad', file: 'scan_07.ply', text: 'scan_07.ply could not be stored and waits: no room' }] });
+  await tab.waitForSelector('.toast:has-text("scan_07.ply could not be stored")');
   await close();
 });
 
