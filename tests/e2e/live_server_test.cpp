@@ -163,6 +163,11 @@ TEST_F(LiveServer, HostileRequestsAreRefusedAndTheSessionLives) {
   const std::string huge(9U << 20U, 'x');
   const int refused = status(client().Post("/scans?name=huge.ply", huge, "application/octet-stream"));
   EXPECT_TRUE(refused == 413 || refused == -1) << refused;  // or the connection is closed while it is still sent
+  fs::create_directory(watched() / "taken.ply");
+  const auto over_a_folder = client().Post("/scans?name=taken.ply", "x", "application/octet-stream");
+  EXPECT_EQ(status(over_a_folder), 500);
+  EXPECT_THAT(over_a_folder->body, testing::HasSubstr("taken.ply could not be stored: Is a directory"));
+  fs::remove(watched() / "taken.ply");
   // One that says so is not read to its end, which may never come.
   EXPECT_THAT(
       answer_to_head("POST /scans?name=huge.ply HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999\r\n\r\n"),

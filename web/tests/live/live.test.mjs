@@ -47,7 +47,7 @@ test('a session is followed: the line, coverage, scans and proposals', { timeout
     assert.ok(share >= before_share);
     before_share = share;
   }
-  assert.match(await now(tab), /^Next: stand 260 mm/);
+  assert.match(await now(tab), /^Next: stand 260\smm/);
   assert.equal(await tab.$$eval('.sensor.ghost', (list) => list.length), 3);
   assert.equal(await tab.$$eval('.sensor:not(.ghost)', (list) => list.length), 4);
   assert.match(await tab.textContent('.pieces'), /Joined/);
