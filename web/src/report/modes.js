@@ -127,7 +127,7 @@ function largest_faces(report) {
   const faces = report.faces.map((face, i) => ({ ...face, i })).filter((face) => face.spots_scanned).sort((a, b) => b.area - a.area || a.i - b.i);
   const entries = faces.slice(0, kFacesInLegend).map(({ name, i }) => ({ name, rgb: category_colour(i) }));
   const left = faces.length - entries.length;
-  return left > 0 ? [...entries, { name: `${number(left)} smaller face${left > 1 ? 's' : ''}: click for the name`, rgb: [255, 255, 255] }] : entries;
+  return left > 0 ? [...entries, { name: `and ${number(left)} smaller`, rgb: [255, 255, 255] }] : entries;
 }
 
 /** All modes that this report has data for. */
