@@ -120,6 +120,13 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
     text += fmt::format("; its edges: {:.0f} measurements more than for the slip that comes closest", best.slip_lead);
   }
   text += ".\n";
+  if (!std::isnan(best.size_hold) && least && best.size_hold < needed) {
+    text += fmt::format(
+        "  Size: the surface that was found would be the same on a larger or smaller part; its edges: {:.0f} "
+        "measurements "
+        "more than for one a tenth larger or smaller.\n",
+        best.size_lead);
+  }
   if (std::isnan(best.overrun_share)) return text;
   text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
                       percent_allowed(record, "max_overrun_share"));

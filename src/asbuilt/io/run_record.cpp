@@ -76,6 +76,8 @@ Json json_of(const CandidateRecord& candidate) {
           {"residual_ratio", json_number(candidate.residual_ratio)},
           {"weakest_direction", json_number(candidate.weakest_direction)},
           {"slip_lead", json_number(candidate.slip_lead)},
+          {"size_hold", json_number(candidate.size_hold)},
+          {"size_lead", json_number(candidate.size_lead)},
           {"overrun_share", json_number(candidate.overrun_share)},
           {"objection", candidate.objection}};
 }
@@ -255,6 +257,8 @@ CandidateRecord candidate_of(const Json& json) {
   candidate.residual_ratio = later_number_at(json, "residual_ratio");
   candidate.weakest_direction = later_number_at(json, "weakest_direction");
   candidate.slip_lead = later_number_at(json, "slip_lead");
+  candidate.size_hold = later_number_at(json, "size_hold");
+  candidate.size_lead = later_number_at(json, "size_lead");
   candidate.overrun_share = later_number_at(json, "overrun_share");
   candidate.objection = json.value("objection", "");
   return candidate;

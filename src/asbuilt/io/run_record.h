@@ -49,6 +49,8 @@ struct CandidateRecord {
   double residual_ratio = kNotTold;     ///< rms / distance that counts as on the model
   double weakest_direction = kNotTold;  ///< how firmly the surface that was found holds the pose
   double slip_lead = kNotTold;          ///< measurements by which the pose leads over the small slip that comes closest
+  double size_hold = kNotTold;          ///< how firmly that surface holds the part's size
+  double size_lead = kNotTold;          ///< measurements by which the pose leads over the part in another size
   double overrun_share = kNotTold;      ///< of the part's edges, those past which the scan's surface goes on
   std::string objection;                ///< reason code of what stands against it on its own; empty: nothing
 

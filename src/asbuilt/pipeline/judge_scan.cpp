@@ -108,6 +108,8 @@ io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Ve
   record.residual_ratio = candidate.residual_ratio;
   record.weakest_direction = candidate.weakest_direction;
   record.slip_lead = candidate.slip_lead;
+  record.size_hold = candidate.size_hold;
+  record.size_lead = candidate.size_lead;
   record.overrun_share = candidate.overrun_share;
   record.objection = verify::code_of(candidate.objection);
   return record;

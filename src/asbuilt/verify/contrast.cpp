@@ -30,19 +30,22 @@ class Contrast {
   }
 
   // Asks the scan about the samples that `own` puts where `other` has nothing.
-  void add(const Pose& own_from_scan, const Pose& other_from_scan, double& for_own, double& for_other) const {
-    const Pose scan_from_own = own_from_scan.inverse();
-    const Eigen::Isometry3f other_from_own = (other_from_scan * scan_from_own).cast<float>();
+  void add(const SizedPose& own, const SizedPose& other, double& for_own, double& for_other) const {
+    const Eigen::Affine3d scan_from_own = own.scan_from_model();
+    const Pose directions = own.model_from_scan.inverse();
+    const Eigen::Affine3f other_from_own = (other.scan_from_model().inverse() * scan_from_own).cast<float>();
     const PointCloud& samples = model_.dense_samples;
-    const SensorInModel sensor(scan_.scan.viewpoint, own_from_scan);
+    scan::Viewpoint viewpoint = scan_.scan.viewpoint;
+    if (viewpoint.kind == scan::Viewpoint::Kind::point) viewpoint.value = directions * own.in_model(viewpoint.value);
+    const SensorInModel sensor(viewpoint, own.model_from_scan);
     for (std::size_t i = 0; i < asked_; ++i) {
       if (is_ruled_out(sensor, samples.positions[i], samples.normals[i])) continue;
-      const double apart = distance_at(other_from_own * samples.positions[i]);
+      const double apart = other.size * distance_at(other_from_own * samples.positions[i]);
       if (apart <= kClearlyNearer * options_.distance_mm) continue;  // both predict it
       const Eigen::Vector3d point = scan_from_own * samples.positions[i].cast<double>();
-      const auto cosine = cosine_to_sensor(scan_from_own, point, samples.positions[i], samples.normals[i]);
+      const auto cosine = cosine_to_sensor(directions, point, samples.positions[i], samples.normals[i]);
       if (!cosine) continue;
-      const double verdict = verdict_on(point, *cosine, own_from_scan, other_from_scan);
+      const double verdict = verdict_on(point, *cosine, own, other);
       (verdict > 0.0 ? for_own : for_other) += std::abs(verdict) * weight_;
     }
   }
@@ -59,9 +62,8 @@ class Contrast {
   [[nodiscard]] double distance_at(const Eigen::Vector3f& point_in_model) const {
     return std::abs(static_cast<double>(model_.field->at(point_in_model).distance));
   }
-  [[nodiscard]] double distance_at(const Pose& model_from_scan, const Eigen::Vector3f& point_in_scan) const {
-    const Eigen::Vector3d point = model_from_scan * point_in_scan.cast<double>();
-    return distance_at(Eigen::Vector3f(point.cast<float>()));
+  [[nodiscard]] double distance_at(const SizedPose& placement, const Eigen::Vector3f& point_in_scan) const {
+    return placement.size * distance_at(placement.in_model(point_in_scan.cast<double>()).cast<float>().eval());
   }
 
   // Without a viewpoint every sample may be visible.
@@ -75,14 +77,14 @@ class Contrast {
   }
 
   // 1 for the pose that puts a sample here, -1 for the other, 0 if the scan does not tell.
-  [[nodiscard]] double verdict_on(const Eigen::Vector3d& point_in_scan, double cosine, const Pose& own_from_scan,
-                                  const Pose& other_from_scan) const {
+  [[nodiscard]] double verdict_on(const Eigen::Vector3d& point_in_scan, double cosine, const SizedPose& own_place,
+                                  const SizedPose& other_place) const {
     const double reach = std::hypot(options_.distance_mm, lateral_at(options_, cosine));
     const KdTree::Neighbour nearest =
         scan_.foreground_tree.nearest(point_in_scan.cast<float>(), static_cast<float>(reach));
     if (nearest.found()) {
       const Eigen::Vector3f& measured = scan_.foreground.cloud.positions[nearest.index];
-      const double own = distance_at(own_from_scan, measured), other = distance_at(other_from_scan, measured);
+      const double own = distance_at(own_place, measured), other = distance_at(other_place, measured);
       if (std::min(own, other) > options_.distance_mm) return 0.0;  // something else, or a deviation
       const double lead = other - own;
       return std::abs(lead) < kClearlyNearer * options_.distance_mm ? 0.0 : std::copysign(1.0, lead);
@@ -108,14 +110,14 @@ double measurements_per_sample(const model::PreparedModel& model, double spacing
   return square_mm2 > 0.0 ? std::min(1.0, model.dense_sample_area_mm2 / square_mm2) : 1.0;
 }
 
-PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan, const model::PreparedModel& model,
+PoseContrast contrast(const SizedPose& first, const SizedPose& second, const model::PreparedModel& model,
                       const ScanEvidence& scan, const EvidenceOptions& options) {
-  const double spacing_mm =
-      0.5 * (spacing_at(first_from_scan, model, scan.scan) + spacing_at(second_from_scan, model, scan.scan));
+  const double spacing_mm = 0.5 * (spacing_at(first.model_from_scan, model, scan.scan) +
+                                   spacing_at(second.model_from_scan, model, scan.scan));
   const Contrast asked(model, scan, spacing_mm, options);
   PoseContrast result;
-  asked.add(first_from_scan, second_from_scan, result.for_first, result.for_second);
-  asked.add(second_from_scan, first_from_scan, result.for_second, result.for_first);
+  asked.add(first, second, result.for_first, result.for_second);
+  asked.add(second, first, result.for_second, result.for_first);
   return result;
 }
 

@@ -7,6 +7,26 @@
 
 namespace asbuilt::verify {
 
+/// Where a part stands, and of which size: the part itself, or a copy of it scaled about a point of the model that
+/// stays where the pose puts it.
+struct SizedPose {
+  SizedPose(const Pose& pose) : model_from_scan(pose) {}  // NOLINT(google-explicit-constructor): size as designed
+  SizedPose(const Pose& pose, double the_size, const Eigen::Vector3d& the_fixed_point)
+      : model_from_scan(pose), size(the_size), fixed_in_model(the_fixed_point) {}
+
+  [[nodiscard]] Eigen::Vector3d in_model(const Eigen::Vector3d& in_scan) const {
+    return fixed_in_model + (model_from_scan * in_scan - fixed_in_model) / size;
+  }
+  [[nodiscard]] Eigen::Affine3d scan_from_model() const {
+    return model_from_scan.inverse() * Eigen::Translation3d(fixed_in_model) * Eigen::Scaling(size) *
+           Eigen::Translation3d(-fixed_in_model);
+  }
+
+  Pose model_from_scan;
+  double size = 1.0;
+  Eigen::Vector3d fixed_in_model = Eigen::Vector3d::Zero();
+};
+
 /// What the scan says where two poses of the part predict different things, in measurements that count singly.
 struct PoseContrast {
   double for_first = 0.0, for_second = 0.0;
@@ -18,15 +38,15 @@ struct PoseContrast {
 /// independent.
 [[nodiscard]] double measurements_per_sample(const model::PreparedModel& model, double spacing_mm);
 
-/// Compares two poses by the samples of the model that only one of them puts where they are: a hole that one claims and
-/// the other does not. Everything that both predict says nothing about which is right, and would drown the rest.
+/// Compares two placements by the samples of the model that only one of them puts where they are: a hole that one
+/// claims and the other does not. Everything that both predict says nothing about which is right, and would drown the
+/// rest.
 ///
 /// Such a sample speaks for its pose if the nearest scan point lies on the model at this pose and clearly less so at
 /// the other; against it, if the sensor measured something else there. What is hidden or averted is not asked.
 /// Symmetric in the two poses. At most `most_samples` of the options are asked. Cost: two lookups a sample, and a
 /// search and a ray for those that differ.
-[[nodiscard]] PoseContrast contrast(const Pose& first_from_scan, const Pose& second_from_scan,
-                                    const model::PreparedModel& model, const ScanEvidence& scan,
-                                    const EvidenceOptions& options);
+[[nodiscard]] PoseContrast contrast(const SizedPose& first, const SizedPose& second, const model::PreparedModel& model,
+                                    const ScanEvidence& scan, const EvidenceOptions& options);
 
 }  // namespace asbuilt::verify

@@ -46,10 +46,12 @@ struct Candidate {
   double support = 0.0;  ///< (evidence for - weighted evidence against) / all samples: candidates compete by it
   double weakest_direction = 0.0;  ///< how well the confirmed surface holds the pose in its loosest direction; see docs
   double weakest_but_near = 0.0;   ///< the same without turns about axes of near-symmetry
-  double slip_lead = 0.0;      ///< measurements by which it leads over any small slip; asked where the surface is loose
-  int loose_directions = 0;    ///< in which the surface that was found does not hold it
-  double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
-  int explained_samples = 0;   ///< model samples that the scan confirms
+  double slip_lead = 0.0;    ///< measurements by which it leads over any small slip; asked where the surface is loose
+  int loose_directions = 0;  ///< in which the surface that was found does not hold it
+  double size_hold = 0.0;    ///< how well the confirmed surface holds the part's size; see docs
+  double size_lead = 0.0;    ///< measurements by which it leads over the part in another size; asked where it does not
+  double overrun_share = 0.0;           ///< share of the model's edges past which the scan's surface simply goes on
+  int explained_samples = 0;            ///< model samples that the scan confirms
   double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does
   bool without_rays = false;            ///< the sensor's place is unknown: what it saw through cannot be asked
   Reason objection = Reason::none;      ///< what stands against it on its own, whatever its rivals

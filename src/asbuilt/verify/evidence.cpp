@@ -94,6 +94,9 @@ class Judge {
       Vector6d row;
       row << lever.cross(normal_in_model.cast<double>()), normal_in_model.cast<double>();
       sum.information += row * row.transpose();
+      const double grown = lever.dot(normal_in_model.cast<double>());
+      sum.twist_growth += grown * row;
+      sum.growth += grown * grown;
     } else if (!scan_.depth) {
       sum.missing += cosine;
     } else {

@@ -63,6 +63,10 @@ struct PoseEvidence {
   /// Of the explained samples' normals on a twist about the part's centre; rotations are measured by the motion that
   /// they cause at half a diameter.
   Matrix6d information = Matrix6d::Zero();
+  /// Likewise of a twist and of growth about the part's centre (which moves the surface at half a diameter by as much as
+  /// a shift by one), and of growth alone.
+  Vector6d twist_growth = Vector6d::Zero();
+  double growth = 0.0;
 
   /// Smallest eigenvalue of the information per explained sample: 0 if the part can slide or turn without leaving the
   /// surface that was found (a plane, a cylinder).

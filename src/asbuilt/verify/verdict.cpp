@@ -42,14 +42,28 @@ double proof_needed(const Candidate& c, const VerifyOptions& options) {
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
 // the surface does, the more so the more ways there are to slip, and less may speak against it. Without rays nothing
 // tells what the sensor looked past, which is most of what an edge can show.
-double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
+double edge_measurements_needed(const Candidate& c, const VerifyOptions& options, int loose_directions) {
   constexpr double kShare = 0.006;  // of the measurements explained
   constexpr double kFurtherDirection = 0.75, kWithoutRays = 6.0;
-  const double directions = 1.0 + kFurtherDirection * std::max(0, c.loose_directions - 1);
+  const double directions = 1.0 + kFurtherDirection * std::max(0, loose_directions - 1);
   // What returned nothing shows neither edges nor that there are none.
   const double unseen = 1.0 + 2.0 * options.missing_hold_surcharge * c.missing_share;
   const double needed = directions * unseen * std::max(0.9 * options.min_contrast, kShare * c.explained_measurements);
   return c.without_rays ? kWithoutRays * needed : needed;
+}
+
+double edge_measurements_needed(const Candidate& c, const VerifyOptions& options) {
+  return edge_measurements_needed(c, options, c.loose_directions);
+}
+
+// Three faces that meet in a corner are those of a block of any size: there its far edges must tell the size, as edges
+// tell where a loose part stands.
+double size_measurements_needed(const Candidate& c, const VerifyOptions& options) {
+  return edge_measurements_needed(c, options, 1);
+}
+
+bool is_of_this_size(const Candidate& c, const VerifyOptions& options) {
+  return c.size_hold >= hold_needed(c.missing_share, options) || c.size_lead >= size_measurements_needed(c, options);
 }
 
 // Of a single flat face, only the outline tells the part from others with such a face, its mirror image among them: the
@@ -135,6 +149,13 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         c.weakest_direction, hold_needed(c.missing_share, options), std::max(0.0, c.slip_lead),
                         edge_measurements_needed(c, options))};
   }
+  if (!options.paper_mode && !is_of_this_size(c, options)) {
+    return {Reason::under_constrained,
+            fmt::format("the part a tenth smaller or larger would lie on the surface that was found as well (its size is "
+                        "held by {:.4f}, {:.4f} needed), and {:.0f} measurements at its edges tell ({:.0f} needed)",
+                        c.size_hold, hold_needed(c.missing_share, options), std::max(0.0, c.size_lead),
+                        size_measurements_needed(c, options))};
+  }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
                                                   100.0 * c.normal_agreement, 100.0 * options.min_normal_agreement)};
@@ -166,7 +187,9 @@ bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
   constexpr double kProofToSpare = 0.12, kHalf = 0.5, kTwice = 2.0;
   const bool is_held_firmly = c.weakest_direction >= kTwice * hold_needed(c.missing_share, options) ||
                               c.slip_lead >= kTwice * edge_measurements_needed(c, options);
-  return objection(c, options).reason == Reason::none && is_held_firmly &&
+  const bool is_surely_of_this_size = c.size_hold >= kTwice * hold_needed(c.missing_share, options) ||
+                                      c.size_lead >= kTwice * size_measurements_needed(c, options);
+  return objection(c, options).reason == Reason::none && is_held_firmly && is_surely_of_this_size &&
          proof(c) >= proof_needed(c, options) + kProofToSpare &&
          c.contradiction_share <= kHalf * options.max_contradiction_share &&
          c.overrun_share <= kHalf * options.max_overrun_share;

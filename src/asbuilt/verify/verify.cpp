@@ -20,6 +20,7 @@
 #include "asbuilt/verify/near_poses.h"
 #include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
+#include "asbuilt/verify/size.h"
 #include "asbuilt/verify/slip.h"
 #include "asbuilt/verify/verdict.h"
 
@@ -378,6 +379,12 @@ class Judge::Verification {
     candidate.overrun_share =
         rim_evidence(candidate.model_from_scan, rim_probes_, rim_reach_, evidence_, options).overrun_share();
     judge_normals(candidate);
+    if (options_.paper_mode) return;
+    const double hold = hold_needed(candidate.missing_share, options_);
+    candidate.size_hold = size_hold(evidence);
+    if (candidate.size_hold < hold && is_plausible()) {
+      candidate.size_lead = size_lead(candidate.model_from_scan, evidence, model_, evidence_, edge_options);
+    }
   }
 
   void cut_out(Detection& detection) const {

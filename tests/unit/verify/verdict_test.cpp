@@ -30,6 +30,7 @@ Candidate flawless(const Eigen::Vector3d& where = {0, 0, 600}) {
   c.rms_mm = 0.1;
   c.support = 0.4;
   c.weakest_direction = 0.05;
+  c.size_hold = 0.05;
   c.explained_samples = 500;
   return c;
 }
@@ -92,6 +93,19 @@ TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradi
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
 }
 
+// 20 of at least 10.8 * (1 + 6 * missing) measurements.
+TEST(Verdict, WhereTheSurfaceFitsAPartOfAnotherSizeItsEdgesMustTell) {
+  const auto reason_of = [](double size_hold, double size_lead, double missing_share) {
+    Candidate candidate = flawless();
+    candidate.size_hold = size_hold, candidate.size_lead = size_lead, candidate.missing_share = missing_share;
+    return decide({candidate}, block(), {}).reason;
+  };
+  EXPECT_EQ(reason_of(0.004, 0.0, 0.0), Reason::none);
+  EXPECT_EQ(reason_of(0.003, 0.0, 0.0), Reason::under_constrained);
+  EXPECT_EQ(reason_of(0.0, 20.0, 0.1), Reason::none);
+  EXPECT_EQ(reason_of(0.0, 20.0, 0.2), Reason::under_constrained);
+}
+
 // 0.004 of at least 0.0035 * (1 + 3 * missing); 25 of at least 10.8 * (1 + 6 * missing) measurements.
 TEST(Verdict, AsksForMoreHoldWhereMoreReturnedNothing) {
   const auto reason_of = [](double weakest_direction, double slip_lead, double missing_share) {
@@ -152,6 +166,7 @@ TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
   const std::vector<std::function<void(Candidate&)>> flaws{
       [](Candidate& c) { c.contradiction_share = 0.02; }, [](Candidate& c) { c.overrun_share = 0.1; },
       [](Candidate& c) { c.weakest_direction = 0.004; },
+      [](Candidate& c) { c.size_hold = 0.0, c.size_lead = 20.0; },
       [](Candidate& c) { c.residual_ratio = 0.3, c.normal_agreement = 0.8; }};
   for (const auto& spoil : flaws) {
     const Detection detection = judged(spoil);

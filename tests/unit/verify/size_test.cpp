@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/verify/size.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "asbuilt/verify/contrast.h"
+#include "asbuilt/verify/verify.h"
+#include "unit/verify/seen.h"
+
+namespace asbuilt::verify {
+namespace {
+
+const Eigen::Vector3d kBrick(100, 80, 60);
+const VerifyOptions kLimits;
+
+// What evidence_for() sums up, of every sample whose normal has a positive product with `side`, or of all.
+PoseEvidence all_found(const model::PreparedModel& model, const std::optional<Eigen::Vector3d>& side) {
+  PoseEvidence evidence;
+  for (std::size_t i = 0; i < model.dense_samples.size(); ++i) {
+    const Eigen::Vector3d normal = model.dense_samples.normals[i].cast<double>();
+    if (side && normal.dot(*side) < 0.1) continue;
+    const Eigen::Vector3d lever =
+        (model.dense_samples.positions[i].cast<double>() - model.box.center()) / (0.5 * model.diameter);
+    Vector6d row;
+    row << lever.cross(normal), normal;
+    evidence.information += row * row.transpose();
+    evidence.twist_growth += lever.dot(normal) * row;
+    evidence.growth += lever.dot(normal) * lever.dot(normal);
+    ++evidence.explained_samples;
+  }
+  return evidence;
+}
+
+// A box that grows about its centre by the growth of its half diameter h leaves face i, half of its edge e_i away, by
+// e_i / 2 / h; on all six faces no motion makes up for it.
+TEST(SizeHold, OfAWholeBoxIsTheMeanSquareOfTheWayOfItsFaces) {
+  const model::PreparedModel brick = test::prepared(simulate::box(kBrick));
+  double areas = 0.0, sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double area = kBrick.prod() / kBrick[i], way = kBrick[i] / kBrick.norm();
+    areas += area;
+    sum += area * way * way;
+  }
+  EXPECT_NEAR(size_hold(all_found(brick, std::nullopt)), sum / areas, 0.02 * sum / areas);
+}
+
+TEST(SizeHold, IsNoneOnThreeFacesAtACorner) {
+  const model::PreparedModel brick = test::prepared(simulate::box(kBrick));
+  EXPECT_LT(size_hold(all_found(brick, Eigen::Vector3d(1, 1, 1))), 0.01 * kLimits.min_weakest_direction);
+}
+
+TEST(SizeHold, OfASphereIsThatOfItsRadiusAsFarAsItIsSeen) {
+  const model::PreparedModel ball = test::prepared(simulate::sphere(40.0, 4));
+  const PoseEvidence half = all_found(ball, Eigen::Vector3d(0, 0, 1));
+  EXPECT_GT(size_hold(half), 2.0 * kLimits.min_weakest_direction);
+  EXPECT_LT(size_hold(half), size_hold(all_found(ball, std::nullopt)));
+}
+
+/// A box in a scan, looked at from its corner, asked as a box of `believed` edges whose corner lies there.
+struct Believed {
+  Believed(const Eigen::Vector3d& built, const Eigen::Vector3d& believed, const std::vector<TriangleMesh>& others)
+      : model(test::prepared(simulate::box(believed))) {
+    std::vector<TriangleMesh> all = others;
+    const Pose there = test::corner_ahead(500);
+    all.push_back(simulate::transformed(simulate::box(built), there));
+    scan = test::seen(all, 0.25);
+    const double distance_mm = 0.5 * scan.spacing_mm + 0.005 * model.diameter;
+    options = {distance_mm, std::max(distance_mm, 2.5 * scan.spacing_mm)};
+    seen = std::make_unique<ScanEvidence>(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+    model_from_scan = (there * Eigen::Translation3d(0.5 * (built - believed))).inverse();
+    evidence = evidence_for(model_from_scan, model.dense_samples, model, *seen, options);
+  }
+  [[nodiscard]] double lead() const { return size_lead(model_from_scan, evidence, model, *seen, options); }
+
+  model::PreparedModel model;
+  Pose model_from_scan;
+  scan::Scan scan;
+  EvidenceOptions options;
+  std::unique_ptr<ScanEvidence> seen;
+  PoseEvidence evidence;
+};
+
+TEST(SizeLead, TellsABoxFromLargerAndSmallerOnesWhereItsEdgesAreSeen) {
+  const Believed right(kBrick, kBrick, {});
+  EXPECT_LT(size_hold(right.evidence), kLimits.min_weakest_direction);
+  EXPECT_GT(right.lead(), 3.0 * kLimits.min_contrast);
+  // A model a tenth too small or too large loses to the box that is there.
+  EXPECT_LT(Believed(kBrick, kBrick / 1.1, {}).lead(), 0.0);
+  EXPECT_LT(Believed(kBrick, kBrick / 0.9, {}).lead(), 0.0);
+}
+
+// A screen before the box with a window in which its nearest corner is seen, but no other.
+TEST(SizeLead, IsNoneWhereTheFarEdgesAreHidden) {
+  const std::vector<TriangleMesh> screen{
+      test::plate_at({200, 400, 1}, {-110, 0, 300}), test::plate_at({200, 400, 1}, {110, 0, 300}),
+      test::plate_at({20, 190, 1}, {0, -105, 300}), test::plate_at({20, 190, 1}, {0, 105, 300})};
+  const Believed right(kBrick, kBrick, screen);
+  EXPECT_GT(right.evidence.explained_samples, 100U);
+  EXPECT_LT(size_hold(right.evidence), kLimits.min_weakest_direction);
+  EXPECT_LT(right.lead(), kLimits.min_contrast);
+}
+
+TEST(SizedPose, KeepsItsFixedPointAndScalesAllDistancesFromIt) {
+  const Pose model_from_scan = test::pose_at({30, -20, 600}).inverse();
+  const Eigen::Vector3d fixed(5, 6, 7), other(25, -4, 9);
+  const SizedPose larger(model_from_scan, 1.25, fixed);
+  EXPECT_LT((larger.scan_from_model() * fixed - model_from_scan.inverse() * fixed).norm(), 1e-9);
+  EXPECT_NEAR((larger.scan_from_model() * other - larger.scan_from_model() * fixed).norm(),
+              1.25 * (other - fixed).norm(), 1e-9);
+  EXPECT_LT((larger.in_model(larger.scan_from_model() * other) - other).norm(), 1e-9);
+}
+
+}  // namespace
+}  // namespace asbuilt::verify
