@@ -168,7 +168,7 @@ void LiveSession::Implementation::describe_surface(LiveState& state, const Surfa
     HoleState shown_hole;
     shown_hole.reachable = seen > 0.2 * hole.area_mm2;
     hole.vertices.clear();
-    shown_hole.text = hole_in_words(hole);
+    shown_hole.text = hole_in_words(hole, model.prepared.face_names);
     if (!shown_hole.reachable) shown_hole.text += ", which no position outside the part sees";
     shown_hole.hole = std::move(hole);
     state.holes.push_back(std::move(shown_hole));

@@ -69,12 +69,12 @@ std::string side_in_words(const Eigen::Vector3d& outwards) {
   return fmt::format("{}, {:.0f}° {}", side, std::abs(elevation), elevation > 0 ? "above" : "below");
 }
 
-std::string hole_in_words(const Hole& hole) {
+std::string hole_in_words(const Hole& hole, const io::CadFaceNames& names) {
   const double cm2 = hole.area_mm2 / 100.0;
   std::string text = cm2 < 9.95 ? fmt::format("{:.1f} cm²", cm2) : fmt::format("{:.0f} cm²", cm2);
   text += fmt::format(" near ({:.0f}, {:.0f}, {:.0f})", hole.centre.x(), hole.centre.y(), hole.centre.z());
   if (!hole.normal.isZero()) text += ", facing " + side_in_words(hole.normal);
-  if (hole.face >= 0) text += fmt::format(", CAD face {}", hole.face);
+  if (hole.face >= 0) text += ", CAD " + io::face_label(hole.face, names);
   return text;
 }
 

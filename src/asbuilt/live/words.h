@@ -14,7 +14,7 @@ namespace asbuilt::live {
 [[nodiscard]] std::string side_in_words(const Eigen::Vector3d& outwards);
 
 /// "120 cm² near (12, -80, 30), facing -y, CAD face 12".
-[[nodiscard]] std::string hole_in_words(const Hole& hole);
+[[nodiscard]] std::string hole_in_words(const Hole& hole, const io::CadFaceNames& names);
 
 /// "from +x, 20° above, 640 mm away: about 14 % new surface".
 [[nodiscard]] std::string view_in_words(const ViewProposal& proposal);
