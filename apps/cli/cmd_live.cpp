@@ -109,9 +109,15 @@ Result<int> run(const Arguments& arguments, Shell& shell) {
   ASBUILT_CHECK(viewer::run_watch(*session, watch, reports, context.stop));
 
   if (arguments.no_result || session->state()->scans.empty()) return kDone;
-  ASBUILT_TRY(record, session->write_result({}));
-  shell.print_result(summary_of(record, (std::filesystem::path(output) / "result").string()));
-  return exit_code_of(record);
+  auto record = session->write_result({});
+  if (!record) {
+    return fail(record.error().code,
+                fmt::format("{}; the session is whole: start it again with the same command, or write the result "
+                            "elsewhere with asbuilt register {}/scans/* -o DIR",
+                            record.error().message, output));
+  }
+  shell.print_result(summary_of(*record, (std::filesystem::path(output) / "result").string()));
+  return exit_code_of(*record);
 }
 
 }  // namespace

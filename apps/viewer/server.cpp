@@ -10,10 +10,13 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <system_error>
 #include <thread>
+#include <utility>
 
 #include "asbuilt/web/pages.h"
 #include "request_check.h"
@@ -38,7 +41,7 @@ class Upload {
   Upload(const fs::path& folder, const std::string& file)
       : place_(folder / file), temporary_(folder / fmt::format(".{}.{}.upload", file.substr(0, 180), next_++)) {
     stream_ = std::fopen(temporary_.c_str(), "wbx");
-    failed_ = stream_ == nullptr;
+    if (stream_ == nullptr) fail_with(errno);
   }
   ~Upload() {
     if (stream_ != nullptr) std::fclose(stream_);
@@ -49,28 +52,34 @@ class Upload {
   Upload& operator=(const Upload&) = delete;
 
   bool append(const char* data, std::size_t size) {
-    if (!failed_ && std::fwrite(data, 1, size, stream_) != size) failed_ = true;
+    if (!failure_ && std::fwrite(data, 1, size, stream_) != size) fail_with(errno);
     bytes_ += size;
-    return !failed_;
+    return !failure_;
   }
   bool finish() {
-    if (failed_ || std::fflush(stream_) != 0 || ::fsync(::fileno(stream_)) != 0) return false;
-    const bool closed = std::fclose(stream_) == 0;
-    stream_ = nullptr;
-    std::error_code error;
-    if (closed) fs::rename(temporary_, place_, error);
-    done_ = closed && !error;
+    if (failure_) return false;
+    if (std::fflush(stream_) != 0 || ::fsync(::fileno(stream_)) != 0) return fail_with(errno);
+    const bool closed = std::fclose(std::exchange(stream_, nullptr)) == 0;
+    if (!closed) return fail_with(errno);
+    fs::rename(temporary_, place_, failure_);
+    done_ = !failure_;
     return done_;
   }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  [[nodiscard]] bool has_failed() const { return failed_; }
+  [[nodiscard]] const std::error_code& failure() const { return failure_; }
 
  private:
+  bool fail_with(int number) {
+    failure_ = {number, std::generic_category()};
+    return false;
+  }
+
   static inline std::atomic<unsigned> next_ = 0;
   fs::path place_, temporary_;
   std::FILE* stream_ = nullptr;
   std::uint64_t bytes_ = 0;
-  bool failed_ = false, done_ = false;
+  std::error_code failure_;
+  bool done_ = false;
 };
 
 }  // namespace
@@ -106,9 +115,12 @@ struct Server::Implementation {
       answer(response, refused->status, refused->reason);
       return httplib::Server::HandlerResponse::Handled;
     });
-    http.set_error_handler([](const httplib::Request&, httplib::Response& response) {
+    http.set_error_handler([](const httplib::Request& request, httplib::Response& response) {
       if (!response.body.empty()) return;
       const int status = response.status;
+      if (status == 400 && request.method == "POST" && !request.has_header("Content-Length")) {
+        return answer(response, status, "a POST needs its Content-Length, be it 0");
+      }
       answer(response, status,
              status == 404   ? "there is nothing under this name (docs/live-protocol.md lists what there is)"
              : status == 413 ? "the request is too large"
@@ -204,19 +216,24 @@ struct Server::Implementation {
     if (!request.has_header("Content-Length") && request.get_header_value("Transfer-Encoding") != "chunked") {
       return refuse(400, "the request has no length");
     }
+    // The library would read all of it first, only to throw it away.
+    const std::uint64_t announced = std::strtoull(request.get_header_value("Content-Length").c_str(), nullptr, 10);
+    if (announced > options.largest_upload) return refuse(413, "the file is too large");
     Upload upload(watched, file);
     const bool whole = body([&](const char* data, std::size_t size) {
       return upload.bytes() + size <= options.largest_upload && upload.append(data, size);
     });
-    if (upload.has_failed()) {
-      return refuse(507, fmt::format("{} could not be stored; is the disk full?", file));
-    }
+    const auto could_not_be_stored = [&] {
+      const bool is_full = upload.failure() == std::errc::no_space_on_device;
+      refuse(is_full ? 507 : 500, fmt::format("{} could not be stored: {}", file, upload.failure().message()));
+    };
+    if (upload.failure()) return could_not_be_stored();
     if (!whole) {
       const bool too_large = response.status == 413 || upload.bytes() >= options.largest_upload;
       return refuse(too_large ? 413 : 400, too_large ? "the file is too large" : "the file did not come whole");
     }
     if (upload.bytes() == 0) return refuse(400, "the file is empty");
-    if (!upload.finish()) return refuse(507, fmt::format("{} could not be stored; is the disk full?", file));
+    if (!upload.finish()) return could_not_be_stored();
     response.status = 202;
     response.set_content(nlohmann::json{{"file", file}, {"bytes", upload.bytes()}}.dump(), kJson);
   }

@@ -21,7 +21,14 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 using live::FileEvent;
 
-constexpr std::chrono::milliseconds kPoll{100}, kRetry{3000};
+constexpr std::chrono::milliseconds kPoll{100}, kRetry{3000}, kRetryWithoutRoom{60000};
+constexpr std::uintmax_t kLittleRoom = 64U << 20U, kNoRoom = 256U << 10U;
+
+std::uintmax_t room_in(const fs::path& folder) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  return error ? 0 : space.available;
+}
 
 /// What threads of the server ask for, and what the folder's watcher found, until the session's thread takes it.
 class Inbox {
@@ -65,7 +72,7 @@ class Inbox {
 class Loop {
  public:
   Loop(live::LiveSession& session, const WatchOptions& options, std::stop_token stop)
-      : session_(session), options_(options), stop_(std::move(stop)) {}
+      : session_(session), options_(options), stop_(std::move(stop)), output_(session.state()->output) {}
 
   Result<void> run(const WatchReports& reports) {
     ASBUILT_TRY(watch, live::FolderWatch::open(options_.watch, options_.settle));
@@ -98,23 +105,19 @@ class Loop {
       }
       if (watch.is_lost() == lost) continue;
       lost = watch.is_lost();
-      inbox_.put([this, lost] {
-        session_.note(
-            lost ? "bad" : "info", "",
-            lost ? "the watched folder is gone; it is looked for until it is back" : "the watched folder is back");
-      });
+      inbox_.put([this, lost] { tell_of_folder(lost); });
     }
   }
 
   void work() {
     auto last_task = Clock::now();
     while (!stop_.stop_requested()) {
+      if (watched_is_full_) tell_of_watched_disk();
       if (auto task = inbox_.take(kPoll)) {
         task();
         last_task = Clock::now();
-      } else if (!again_.empty() && Clock::now() - last_failure_ > kRetry) {
-        const std::set<std::string> files = std::exchange(again_, {});
-        for (const std::string& file : files) take({FileEvent::Kind::ready, file});
+      } else if (is_time_to_try_again()) {
+        for (const std::string& file : std::set<std::string>(waiting_)) take({FileEvent::Kind::ready, file});
       } else if (session_.refinement_is_due() && Clock::now() - last_task > options_.idle) {
         refine();
         last_task = Clock::now();
@@ -137,19 +140,75 @@ class Loop {
     if (event.kind == FileEvent::Kind::ignored) {
       session_.note("info", event.file, fmt::format("{} is ignored: it is no scan by its name", event.file));
     } else if (event.kind == FileEvent::Kind::gone) {
-      again_.erase(event.file);
+      waiting_.erase(event.file);
       done = session_.remove(event.file);
     } else if (std::error_code error; fs::is_regular_file(options_.watch / event.file, error)) {
       done = session_.add((options_.watch / event.file).string());
     }
-    if (done || stop_.stop_requested()) return;
-    if (event.kind == FileEvent::Kind::ready && again_.insert(event.file).second) {
-      session_.note("bad", event.file,
-                    fmt::format("{} could not be stored and is tried again: {}", event.file, done.error().message));
-    } else if (event.kind != FileEvent::Kind::ready) {
+    if (stop_.stop_requested()) return;
+    tell_of_watched_disk();
+    if (!done && event.kind == FileEvent::Kind::ready) {
+      waiting_.insert(event.file);
+      last_failure_ = Clock::now();
+      room_at_failure_ = room_in(output_);
+      why_waiting_ = done.error().message;
+    } else if (!done) {
       session_.note("bad", event.file, done.error().message);
+    } else if (waiting_.erase(event.file) > 0) {
+      session_.note("info", event.file, fmt::format("{} is stored after all", event.file));
     }
-    last_failure_ = Clock::now();
+    tell_of_waiting();
+  }
+
+  /// Where the disk was full, as soon as there is more room than there was: to judge a scan takes its time.
+  [[nodiscard]] bool is_time_to_try_again() const {
+    const auto waited = Clock::now() - last_failure_;
+    if (waiting_.empty() || waited < kRetry) return false;
+    return room_at_failure_ > kLittleRoom || room_in(output_) > room_at_failure_ || waited > kRetryWithoutRoom;
+  }
+
+  void tell_of_waiting() {
+    if (waiting_ == was_waiting_) return;
+    for (const std::string& file : waiting_) {
+      if (was_waiting_.contains(file)) continue;
+      session_.note("bad", file, fmt::format("{} could not be stored and waits: {}", file, why_waiting_));
+    }
+    was_waiting_ = waiting_;
+    if (waiting_.empty()) return session_.end_trouble("storing");
+    const std::string who =
+        waiting_.size() == 1 ? *waiting_.begin() + " waits" : fmt::format("{} files wait", waiting_.size());
+    if (room_at_failure_ < kLittleRoom) {
+      session_.set_trouble(
+          "storing",
+          {fmt::format("The disk is full: {}.", who),
+           fmt::format("Make room on the disk of {} and it goes on by itself; nothing is lost.", output_.string())});
+    } else {
+      session_.set_trouble("storing", {fmt::format("The session's folder cannot be written: {}.", who),
+                                       fmt::format("{}. It is tried again; nothing is lost.", why_waiting_)});
+    }
+  }
+
+  /// The file that filled it was cut short by whoever wrote it.
+  void tell_of_watched_disk() {
+    std::error_code error;
+    if (!fs::exists(options_.watch, error)) return;
+    const bool is_full = room_in(options_.watch) < kNoRoom;
+    if (is_full == watched_is_full_) return;
+    watched_is_full_ = is_full;
+    if (!is_full) return session_.end_trouble("watched disk");
+    session_.set_trouble("watched disk", {"The disk of the watched folder is full.",
+                                          "The last scan may have been cut short: make room and save it again."});
+  }
+
+  void tell_of_folder(bool lost) {
+    if (!lost) {
+      session_.end_trouble("folder");
+      return session_.note("info", "", "the watched folder is back");
+    }
+    session_.set_trouble("folder", {"The watched folder is gone.", fmt::format("{} is looked for until it is back; "
+                                                                               "the scans so far are safe.",
+                                                                               options_.watch.string())});
+    session_.note("bad", "", "the watched folder is gone; it is looked for until it is back");
   }
 
   void refine() {
@@ -166,7 +225,7 @@ class Loop {
     }
     inbox_.put([this, file] {
       const auto done = session_.take_out(file);
-      if (!done) session_.note("bad", file, done.error().message);
+      if (!done) session_.note("bad", file, fmt::format("{} could not be taken out: {}", file, done.error().message));
     });
     return true;
   }
@@ -176,7 +235,9 @@ class Loop {
     if (std::ranges::find(state->removed, file) == state->removed.end()) return false;
     inbox_.put([this, file] {
       const auto done = session_.restore(file);
-      if (!done) return session_.note("bad", file, done.error().message);
+      if (!done) {
+        return session_.note("bad", file, fmt::format("{} could not be taken in: {}", file, done.error().message));
+      }
       take({FileEvent::Kind::ready, file});
     });
     return true;
@@ -191,7 +252,11 @@ class Loop {
   const WatchOptions& options_;
   std::stop_token stop_;
   Inbox inbox_;
-  std::set<std::string> again_;
+  fs::path output_;
+  std::set<std::string> waiting_, was_waiting_;  // files that could not be stored; those that the page tells of
+  std::string why_waiting_;
+  std::uintmax_t room_at_failure_ = 0;
+  bool watched_is_full_ = false;
   Clock::time_point last_failure_;
 };
 

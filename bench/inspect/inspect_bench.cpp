@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "asbuilt/core/random.h"
@@ -27,6 +28,7 @@ struct MeasuredSpot {
   Eigen::Vector3d position, normal;
   bool scanned = false;
   double deviation = 0.0, error = 0.0;
+  int scan = -1;  ///< that brought most of its points
 };
 
 std::vector<std::string> fields_of(const std::string& line) {
@@ -49,9 +51,32 @@ std::vector<MeasuredSpot> read_spots(const fs::path& path) {
     spot.scanned = !f[6].empty();
     if (spot.scanned) spot.deviation = std::stod(f[6]);
     if (spot.scanned && !f[7].empty()) spot.error = std::stod(f[7]);
+    if (spot.scanned && !f[10].empty()) spot.scan = std::stoi(f[10]);
     spots.push_back(spot);
   }
   return spots;
+}
+
+/// For each scan that report and truth have both placed, the motion from its true place to the reported one.
+std::vector<std::optional<Pose>> pose_errors(const simulate::Simulation& simulation, const nlohmann::json& report) {
+  std::vector<std::optional<Pose>> errors(simulation.scans.size());
+  for (const auto& scan : report["scans"]) {
+    const auto index = scan["index"].get<std::size_t>();
+    const auto& truth = simulation.scans[index].model_from_scan;
+    if (!scan["model_from_scan"].is_array() || !truth) continue;
+    const auto numbers = scan["model_from_scan"].get<std::vector<double>>();
+    Pose pose;
+    pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+    errors[index] = pose * truth->inverse();
+  }
+  return errors;
+}
+
+/// How far a spot is moved outwards by the error of the scan that brought most of its points: what no inspection of the
+/// cloud can see.
+double by_poses(const MeasuredSpot& spot, const std::vector<std::optional<Pose>>& errors) {
+  if (spot.scan < 0 || !errors[static_cast<std::size_t>(spot.scan)]) return 0.0;
+  return (*errors[static_cast<std::size_t>(spot.scan)] * spot.position - spot.position).dot(spot.normal);
 }
 
 double sigma_of(const std::vector<double>& values) {
@@ -62,7 +87,8 @@ double sigma_of(const std::vector<double>& values) {
 }
 
 struct Options {
-  int scenes = 20, scans = 8, points = 60000;
+  int first = 0, scenes = 20, scans = 8, points = 60000;
+  bool keep = false;  ///< the scenes and their reports
   std::uint64_t seed = 1;
   fs::path folder = "inspect_bench";
 };
@@ -98,9 +124,13 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
                                             {folder / "result", false, {}, {}}, context);
   if (!record) return {{"scene", number}, {"error", record.error().message}};
 
+  std::ifstream file(folder / "result/report.json");
+  const auto report = nlohmann::json::parse(file);
   const InspectionTruth truth(simulation);
+  const auto errors_of_poses = pose_errors(simulation, report);
   const auto spots = read_spots(folder / "result/points.csv");
   std::vector<double> measured, expected, pulls;
+  double mean_by_poses = 0.0;
   std::size_t visible = 0, scanned = 0, wrongly = 0, missed = 0;
   double noise = 0.0;
   for (const MeasuredSpot& spot : spots) {
@@ -114,6 +144,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
     if (!deviation) continue;
     measured.push_back(spot.deviation);
     expected.push_back(*deviation);
+    mean_by_poses += by_poses(spot, errors_of_poses);
     noise += spot.error * spot.error;
     if (spot.error > 0.0) pulls.push_back(std::abs(spot.deviation - *deviation) / spot.error);
   }
@@ -124,8 +155,6 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
   const double without_noise = std::sqrt(std::max(0.0, spread * spread - noise / n));
   std::ranges::sort(pulls);
 
-  std::ifstream file(folder / "result/report.json");
-  const auto report = nlohmann::json::parse(file);
   nlohmann::ordered_json bumps = nlohmann::ordered_json::array();
   std::vector<bool> used(report["regions"].size(), false);
   for (const simulate::Bump& bump : built.bumps) {
@@ -148,11 +177,13 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
       return nearest != about.end() && (*nearest)->scanned && (*nearest)->normal.dot(bump.normal) > 0.5;
     };
     const double peak = truth.peak(bump, is_scanned).value_or(0.0);
-    nlohmann::ordered_json entry{{"height", bump.height_mm},
-                                 {"spots_scanned", around},
-                                 {"true_peak", peak},
-                                 {"limit", limit},
-                                 {"error_around", around > 0 ? error_around / static_cast<double>(around) : 0.0}};
+    nlohmann::ordered_json entry{
+        {"height", bump.height_mm},
+        {"spots_scanned", around},
+        {"true_peak", peak},
+        {"radius", bump.radius_mm},
+        {"limit", limit},
+        {"error_around", around > 0 ? error_around / static_cast<double>(around) : 0.0}};
     for (std::size_t r = 0; r < report["regions"].size(); ++r) {
       const auto at = report["regions"][r]["peak_at"].get<std::vector<double>>();
       const Eigen::Vector3d place(at[0], at[1], at[2]);
@@ -162,6 +193,9 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
         const double error = report["regions"][r]["peak_standard_error"].get<double>();
         entry["peak"] = found;
         entry["standard_error"] = error;
+        const auto nearest = std::ranges::min_element(
+            spots, {}, [&](const MeasuredSpot& spot) { return (spot.position - place).squaredNorm(); });
+        entry["by_poses"] = by_poses(*nearest, errors_of_poses);
         entry["within"] = std::abs(found - peak) <= std::max(0.3 * sigma, 3.0 * error);
       }
       used[r] = true;
@@ -172,7 +206,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
   for (std::size_t r = 0; r < used.size(); ++r) invented += !used[r] && report["regions"][r]["significant"].get<bool>();
 
   const auto all = static_cast<double>(spots.size());
-  fs::remove_all(folder);
+  if (!options.keep) fs::remove_all(folder);
   return {{"scene", number},
           {"sigma", sigma},
           {"coverage", static_cast<double>(scanned) / all},
@@ -180,6 +214,7 @@ nlohmann::ordered_json run_scene(const Options& options, int number, const Conte
           {"scanned_unseen", static_cast<double>(wrongly) / all},
           {"seen_unscanned", static_cast<double>(missed) / all},
           {"mean_error_in_sigma", mean_error / sigma},
+          {"mean_by_poses_in_sigma", mean_by_poses / n / sigma},
           {"spread", spread},
           {"spread_without_noise", without_noise},
           {"true_spread", true_spread},
@@ -194,7 +229,7 @@ int run_scenes(const Options& options) {
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   int coverage = 0, mean = 0, spread = 0, bumps = 0, within = 0, found = 0, invented = 0, done = 0;
   fmt::print("scene  coverage  visible  mean/sigma  spread err  bumps found/within  invented\n");
-  for (int i = 0; i < options.scenes; ++i) {
+  for (int i = options.first; i < options.first + options.scenes; ++i) {
     auto scene = run_scene(options, i, context);
     all.push_back(scene);
     if (scene.contains("error")) {
@@ -265,6 +300,8 @@ int main(int argc, char** argv) {
   std::size_t speed_points = 0;
   for (int i = 1; i + 1 < argc; i += 2) {
     const std::string name = argv[i], value = argv[i + 1];
+    if (name == "--first") options.first = std::stoi(value);
+    if (name == "--keep") options.keep = value != "0";
     if (name == "--scenes") options.scenes = std::stoi(value);
     if (name == "--scans") options.scans = std::stoi(value);
     if (name == "--points") options.points = std::stoi(value);

@@ -29,7 +29,8 @@ class LiveScenes : public testing::Test {
   }
   ~LiveScenes() override { fs::remove_all(base_); }
 
-  void simulate_scenes(int scans, std::uint64_t seed, double absent_share = 0.0, int points = 20000) {
+  void simulate_scenes(int scans, std::uint64_t seed, double absent_share = 0.0, int points = 20000,
+                       const TriangleMesh& part = casing()) {
     simulate::SimulateOptions options{.scans = scans,
                                       .points = points,
                                       .seed = seed,
@@ -37,7 +38,7 @@ class LiveScenes : public testing::Test {
                                       .clutter_high = 0.7,
                                       .absent_share = absent_share,
                                       .as_built = {}};
-    const auto simulation = simulate::simulate(casing(), options, Context(2));
+    const auto simulation = simulate::simulate(part, options, Context(2));
     ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
     ASSERT_TRUE(simulate::write_simulation(base_ / "scenes", *simulation).has_value());
     for (const auto& scan : simulation->scans) names_.push_back(scan.name + ".ply");
@@ -56,14 +57,15 @@ class LiveScenes : public testing::Test {
   }
 
   /// What `asbuilt reconstruct` makes of the files that are now watched, in order of name.
-  void reconstruct(const fs::path& folder, const pipeline::Options& options = {}) const {
+  io::RunRecord reconstruct(const fs::path& folder, const pipeline::Options& options = {}) const {
     std::vector<std::string> paths;
     for (const auto& entry : fs::directory_iterator(watched())) {
       if (entry.is_regular_file()) paths.push_back(entry.path().string());
     }
     std::ranges::sort(paths);
     const auto record = pipeline::reconstruct(model(), paths, options, {folder, false, {}}, Context(2));
-    ASSERT_TRUE(record.has_value()) << record.error().message;
+    EXPECT_TRUE(record.has_value()) << record.error().message;
+    return record.value_or(io::RunRecord{});
   }
 
   /// Every file of a result but timing.json, by name. The report says which command made it, which is left out here.

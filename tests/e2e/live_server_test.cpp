@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <array>
 #include <condition_variable>
+#include <csignal>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -52,6 +58,23 @@ class LiveServer : public test::LiveScenes {
     return client;
   }
   [[nodiscard]] Json state() const { return Json::parse(client().Get("/state")->body); }
+
+  /// What is answered to a request of which nothing but the head is ever sent.
+  [[nodiscard]] std::string answer_to_head(const std::string& head) const {
+    const int connection = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const timeval patience{20, 0};  // the server gives up on a body after 30 s
+    ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port_));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    EXPECT_EQ(::send(connection, head.data(), head.size(), MSG_NOSIGNAL), static_cast<ssize_t>(head.size()));
+    std::array<char, 64> answer{};
+    const ssize_t got = ::recv(connection, answer.data(), answer.size(), 0);
+    ::close(connection);
+    return {answer.data(), got > 0 ? static_cast<std::size_t>(got) : 0};
+  }
 
   /// Waits for a state that will do, however long a loaded machine takes.
   template <class Wanted>
@@ -140,6 +163,15 @@ TEST_F(LiveServer, HostileRequestsAreRefusedAndTheSessionLives) {
   const std::string huge(9U << 20U, 'x');
   const int refused = status(client().Post("/scans?name=huge.ply", huge, "application/octet-stream"));
   EXPECT_TRUE(refused == 413 || refused == -1) << refused;  // or the connection is closed while it is still sent
+  fs::create_directory(watched() / "taken.ply");
+  const auto over_a_folder = client().Post("/scans?name=taken.ply", "x", "application/octet-stream");
+  EXPECT_EQ(status(over_a_folder), 500);
+  EXPECT_THAT(over_a_folder->body, testing::HasSubstr("taken.ply could not be stored: Is a directory"));
+  fs::remove(watched() / "taken.ply");
+  // One that says so is not read to its end, which may never come.
+  EXPECT_THAT(
+      answer_to_head("POST /scans?name=huge.ply HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999\r\n\r\n"),
+      testing::StartsWith("HTTP/1.1 413"));
   EXPECT_TRUE(fs::is_empty(watched()));
   EXPECT_EQ(status(client().Get("/state")), 200);
 }
@@ -152,6 +184,26 @@ TEST_F(LiveServer, WithATokenNothingIsToldWithoutIt) {
   }
   EXPECT_EQ(client().Get("/state?token=secret")->status, 200);
   EXPECT_EQ(client().Get("/state", {{"Authorization", "Bearer secret"}})->status, 200);
+}
+
+TEST_F(LiveServer, WhatCannotBeStoredIsToldAndStoredByItselfOnceItCan) {
+  simulate_scenes(1, 46);
+  start();
+  fs::copy_file(base_ / "scenes" / names_[0], base_ / "coming");
+  ::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = 4096;
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  fs::rename(base_ / "coming", watched() / names_[0]);
+  const Json waiting = until([](const Json& now) { return now["now"]["level"] == "bad"; });
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_THAT(waiting["now"]["headline"].get<std::string>(), testing::HasSubstr(names_[0] + " waits"));
+  EXPECT_TRUE(waiting["scans"].empty());
+  const Json stored = until([](const Json& now) { return now["scans"].size() == 1 && now["now"]["level"] != "bad"; });
+  EXPECT_EQ(stored["scans"][0]["status"], "accepted");
+  EXPECT_EQ(stored["notes"].back()["level"], "info");
 }
 
 TEST_F(LiveServer, ATakenPortIsToldByItsNumber) {

@@ -37,39 +37,6 @@ TEST_F(LiveSessionTest, EndsWithTheBytesOfReconstructInWhateverOrderScansCame) {
   EXPECT_EQ(content(output() / "result"), content(base_ / "reference"));
 }
 
-TEST_F(LiveSessionTest, ShowsAfterTheJointRefinementWhatTheResultWillHave) {
-  simulate_scenes(5, 22);
-  auto session = open();
-  for (const std::string& name : names_) ASSERT_TRUE(session->add(put(name)).has_value());
-  const auto before = session->state();
-  std::set<std::pair<std::string, std::string>> incremental;
-  ASSERT_TRUE(session->refine_jointly({}).value());
-  const auto state = session->state();
-  const auto record = session->write_result({});
-  ASSERT_TRUE(record.has_value());
-  ASSERT_EQ(state->scans.size(), record->scans.size());
-  for (std::size_t i = 0; i < record->scans.size(); ++i) {
-    const io::ScanRecord& shown = state->scans[i].record;
-    EXPECT_EQ(shown.status, record->scans[i].status) << shown.name;
-    if (!record->scans[i].model_from_scan) continue;
-    ASSERT_TRUE(shown.model_from_scan.has_value());
-    // A point at the part's edge moves by less than 0.05 sigma between the two.
-    const double sigma = std::max(shown.noise_sigma, 1e-3), reach = record->model.diameter;
-    const Pose apart = record->scans[i].model_from_scan->inverse() * *shown.model_from_scan;
-    EXPECT_LE(apart.translation().norm() + reach * rotation_angle(apart.linear()), 0.05 * sigma) << shown.name;
-  }
-  std::set<std::pair<int, int>> shown_links, final_links;
-  for (const LinkState& link : state->links) {
-    if (link.used) shown_links.insert({link.a, link.b});
-  }
-  for (const io::OverlapRecord& overlap : record->graph->overlaps) {
-    if (overlap.linked) final_links.insert({std::min(overlap.a, overlap.b), std::max(overlap.a, overlap.b)});
-  }
-  EXPECT_EQ(shown_links, final_links);
-  EXPECT_GT(state->covered_share, 0.2);
-  EXPECT_GE(state->covered_share, before->covered_share - 0.05);
-}
-
 TEST_F(LiveSessionTest, RemovalReplacementAndDuplicatesLeaveNoTrace) {
   simulate_scenes(3, 23);
   auto session = open();

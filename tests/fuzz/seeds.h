@@ -116,6 +116,27 @@ inline std::string ptx_seed() {
 
 inline std::string depth_seed() { return png(2, 3, std::string("\0\x03\xe8\x03\xe9\1\x03\xe8\0\2\4\0\1\0\1", 15)); }
 
+// What a live session keeps: the files that were taken out; what a scan told of its sensor; the record of a scan.
+inline constexpr const char* kRemovedSeed = R"({"removed": {"a.ply": "00ff"}})";
+inline constexpr const char* kSensorSeed =
+    R"({"order": 3, "sensor": {"half_angle": 25.5, "near": 300.0, "far": 1400.0, "distance": 690.0}})";
+inline constexpr const char* kRecordSeed = R"({"asbuilt": {"version": "0.1.0", "schema": 1}, "state": "complete",
+"unit": "mm", "options": {"unit": "stated", "memory": 0.5, "exclude": ["b"], "mesh": false, "seed": 1},
+"model": {"path": "m.ply", "sha256": "9b", "triangles": 12, "diameter": 478.2, "sampling_distance": 17.0,
+"symmetry": "none"}, "scans": [{"path": "a.ply", "name": "a", "index_in_file": 0, "scans_in_file": 1, "instance": 1,
+"instances_in_scan": 1, "sha256": "ae", "points": 9, "viewpoint": [0, 0, 0], "viewpoint_kind": "point",
+"normals_oriented": true, "noise_sigma": 0.1, "spacing": 0.3, "offset": [0, 0, 0], "status": "rejected",
+"reason_code": "low_score", "reason": "no", "model_from_scan_detected": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],
+"model_from_scan": null, "covariance": null, "component": null, "hold_sigma": [], "loose_motions": [], "votes": 1.5,
+"score": 0.9, "visible_share": 0.2, "free_space_violations": 0, "normal_agreement": 1, "margin": 0.1, "candidates": [],
+"segment_points": 0, "warnings": ["w"]}]})";
+
+/// A request as it comes over the wire, after the letter of the server that it goes to.
+inline std::string http_seed(const std::string& method, const std::string& target, const std::string& more = {},
+                             const std::string& body = {}, char server = 'o') {
+  return server + method + " " + target + " HTTP/1.1\r\nHost: localhost\r\n" + more + "\r\n" + body;
+}
+
 inline std::vector<Seed> seeds() {
   return {
       {"ply", "ascii.ply", ply_ascii_seed(), 4, true, true},
@@ -148,6 +169,33 @@ inline std::vector<Seed> seeds() {
       {"pose", "poses.csv", "name,matrix\na,0,-1,0,1,1,0,0,2,0,0,1,3,0,0,0,1\n"},
       {"pose", "poses.json", R"([{"scan": "a", "model_from_scan": [[0,-1,0,1],[1,0,0,2],[0,0,1,3],[0,0,0,1]]}])"},
       {"pose", "viewpoints.csv", "name,x,y,z\na,1,2,3\nb,4,5,6\n"},
+  };
+}
+
+/// Of the targets that read no files of points.
+inline std::vector<Seed> live_seeds() {
+  return {
+      {"state", "removed.json", std::string("r") + kRemovedSeed},
+      {"state", "sensor.json", std::string("s") + kSensorSeed},
+      {"state", "record.json", std::string("d") + kRecordSeed},
+      {"http", "state", http_seed("GET", "/state")},
+      {"http", "elsewhere", "oGET /state HTTP/1.1\r\nHost: a.example\r\n\r\n"},
+      {"http", "events", http_seed("GET", "/events", "Origin: http://localhost\r\n")},
+      {"http", "values", http_seed("GET", "/surface/values?revision=1", "Authorization: Bearer x\r\n", "", 't')},
+      {"http", "token", http_seed("GET", "/state?token=0f5a", "", "", 't')},
+      {"http", "guarded_upload", http_seed("POST", "/scans?name=e.ply&token=x", "Content-Length: 4\r\n", "ply\n", 't')},
+      {"http", "traversal", http_seed("POST", "/scans?name=..%2Fbeside.ply", "Content-Length: 4\r\n", "ply\n")},
+      {"http", "two_requests",
+       http_seed("GET", "/nothing", "Content-Length: 40\r\n", "DELETE /scans/known.ply HTTP/1.1\r\nHost: a\r\n\r\n")},
+      {"http", "upload", http_seed("POST", "/scans?name=a%20b.ply", "Content-Length: 5\r\n", "ply\n0")},
+      {"http", "chunked",
+       http_seed("POST", "/scans?name=c.xyz", "Transfer-Encoding: chunked\r\n", "3\r\n1 2\r\n0\r\n\r\n")},
+      {"http", "form",
+       http_seed("POST", "/scans?name=d.ply", "Content-Length: 9\r\nContent-Type: multipart/form-data; boundary=x\r\n",
+                 "--x\r\n\r\n--")},
+      {"http", "delete", http_seed("DELETE", "/scans/known.ply")},
+      {"http", "restore", http_seed("POST", "/scans/known.ply/restore", "Content-Length: 0\r\n")},
+      {"http", "result", http_seed("POST", "/result", "Content-Length: 0\r\nRange: bytes=0-1\r\n")},
   };
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The live page: states come from the server, each panel shows its share of them.
 import { h } from './shared/dom.js';
+import { typeset } from './shared/format.js';
 import { Banner } from './live/banner.js';
 import { LiveClient, Newest } from './live/client.js';
 import { Side } from './live/side.js';
@@ -17,8 +18,13 @@ const strip = new Strip(choose);
 const sound = new Sound();
 let state = null;
 let chosen = null;
+let last_note = 0;
 
-const client = new LiveClient({ state: take, connection: (connection) => { banner.set_connection(connection); if (connection === 'open') load_surface(); } });
+const client = new LiveClient({ state: take, connection: (connection) => {
+  banner.set_connection(connection);
+  if (connection === 'lost') values.forget();
+  if (connection === 'open') load_surface();
+} });
 const side = new Side({
   show_view: (i) => view.show_view(i), show_hole: (i) => view.show_hole(i), write_result: () => attempt(client.write_result()),
   restore: (file) => attempt(client.restore(file)), add: (files) => files.forEach((file) => attempt(client.add(file), `${file.name} is being sent`)),
@@ -40,6 +46,10 @@ function take(next) {
   view.set_state(state);
   if (view.surface) values.want(state.surface_revision);
   if (state.now.sound && !first) announce(state.now.sound);
+  // A note beside many others is easily missed.
+  const newest = state.notes.at(-1);
+  if (newest?.level === 'bad' && newest.revision > last_note && !first) say(typeset(newest.text));
+  last_note = newest?.revision ?? 0;
   show_sheet();
   document.documentElement.dataset.revision = state.revision;
 }

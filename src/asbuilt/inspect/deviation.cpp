@@ -2,6 +2,7 @@
 #include "asbuilt/inspect/deviation.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +10,12 @@
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
+#include "asbuilt/io/cad_face_name.h"
 
 namespace asbuilt::inspect {
 namespace {
+
+constexpr std::size_t kMostNamesInMessage = 6;
 
 Result<void> check_share(std::string_view name, double value) {
   if (value >= 0.0 && value <= 1.0) return {};
@@ -125,7 +129,7 @@ class Inspection {
     if (model_.dense_samples.empty()) {
       return fail(ErrorCode::not_possible, "the model has no surface to measure against");
     }
-    report_.face_map = faces_of(model_.skin);
+    report_.face_map = faces_of(model_.skin, model_.face_names);
     ASBUILT_CHECK(declare_parts());
     ASBUILT_TRY(feet, aligned_feet(measurement_, model_, options_, report_.alignment, context_));
     context_.report_progress(0.6);
@@ -155,6 +159,7 @@ class Inspection {
       face.cad_face = report_.face_map.cad_face[i];
       face.tolerance = others;
     }
+    std::vector<int> named;
     for (const ToleranceRow& row : options_.tolerances.rows) {
       if (row.box) {
         SurfacePart& box = report_.boxes.emplace_back();
@@ -163,18 +168,79 @@ class Inspection {
         report_.box_extents.push_back(*row.box);
         continue;
       }
-      const auto face = std::ranges::find(report_.faces, *row.face, &SurfacePart::cad_face);
+      ASBUILT_TRY(number, number_of_face(row));
+      const auto face = std::ranges::find(report_.faces, number, &SurfacePart::cad_face);
       if (face == report_.faces.end()) {
         const std::string what = model_.skin.cad_faces.empty()
                                      ? "but the model is a mesh, without CAD faces; give a box instead"
                                      : "which the model's outer skin has not";
-        return fail(ErrorCode::invalid_argument,
-                    fmt::format("the tolerances, line {}, name face {}, {}", row.place, *row.face, what));
+        return refused(row, fmt::format("the row is for {}, {}", io::face_label(number, model_.face_names), what));
       }
+      if (std::ranges::count(named, number) > 0) {
+        return refused(row, fmt::format("{} is given a second tolerance; keep one of the two rows", face->name));
+      }
+      named.push_back(number);
       face->tolerance = row.tolerance;
-      face->name = row.name;
+      // A name that the file gives is told beside the CAD's.
+      const bool has_own_name = row.name != fmt::format("face {}", number) && row.name != row.face_name;
+      if (has_own_name) face->name = fmt::format("{} ({})", row.name, face->name);
     }
     return {};
+  }
+
+  [[nodiscard]] tl::unexpected<Error> refused(const ToleranceRow& row, const std::string& why) const {
+    const std::string& source = options_.tolerances.source;
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("{}, line {}: {}", source.empty() ? "the tolerances" : source, row.place, why));
+  }
+
+  /// The face that a row is for, by its number or by the one face that has its name.
+  [[nodiscard]] Result<int> number_of_face(const ToleranceRow& row) const {
+    if (row.face) return *row.face;
+    const std::string name = io::clean_cad_name(row.face_name);
+    const std::vector<int> same = faces_called([&](const std::string& other) { return other == name; });
+    if (same.size() == 1 && !name.empty()) return same.front();
+    if (model_.skin.cad_faces.empty()) {
+      return refused(row,
+                     fmt::format("the row is for the face '{}', but the model is a mesh, without CAD faces; give a "
+                                 "box instead: NAME,LOW,HIGH,X1,Y1,Z1,X2,Y2,Z2",
+                                 name));
+    }
+    if (same.size() > 1 && !name.empty()) {
+      return refused(row,
+                     fmt::format("{} CAD faces are called '{}', expected the name of one; give the number of one: {}",
+                                 same.size(), name, some_of(same)));
+    }
+    const std::vector<int> named = faces_called([](const std::string& other) { return !other.empty(); });
+    if (named.empty()) {
+      return refused(row,
+                     fmt::format("no face is called '{}', as the CAD file names none; give the number of a CAD face, "
+                                 "as in faces.csv, or a box: NAME,LOW,HIGH,X1,Y1,Z1,X2,Y2,Z2",
+                                 name));
+    }
+    return refused(row,
+                   fmt::format("no CAD face of the outer skin is called '{}', expected a name as in {}; or give the "
+                               "number of a face",
+                               name, some_of(named)));
+  }
+
+  /// Numbers of the CAD faces whose name passes a test.
+  template <class Test>
+  [[nodiscard]] std::vector<int> faces_called(const Test& test) const {
+    std::vector<int> found;
+    for (const int face : report_.face_map.cad_face) {
+      const auto number = static_cast<std::size_t>(std::max(face, 0));
+      if (face >= 0 && number < model_.face_names.size() && test(model_.face_names[number].name)) found.push_back(face);
+    }
+    return found;
+  }
+
+  [[nodiscard]] std::string some_of(const std::vector<int>& faces) const {
+    std::vector<std::string> labels;
+    for (const int face : faces) {
+      if (labels.size() < kMostNamesInMessage) labels.push_back(io::face_label(face, model_.face_names));
+    }
+    return fmt::format("{}{}", fmt::join(labels, ", "), faces.size() > labels.size() ? " ..." : "");
   }
 
   void describe_points(const Feet& feet) {

@@ -19,7 +19,7 @@ constexpr double kSmallPiece = 0.005;  // of the area
 constexpr std::size_t kMostPieces = 100;
 constexpr std::size_t kLeastSpots = 3;
 
-FaceMap cad_faces_of(const TriangleMesh& skin) {
+FaceMap cad_faces_of(const TriangleMesh& skin, const io::CadFaceNames& cad_names) {
   FaceMap map;
   map.cad_face = skin.cad_faces;
   std::ranges::sort(map.cad_face);
@@ -29,7 +29,7 @@ FaceMap cad_faces_of(const TriangleMesh& skin) {
     const auto place = std::ranges::lower_bound(map.cad_face, face);
     map.of_triangle.push_back(static_cast<std::uint32_t>(place - map.cad_face.begin()));
   }
-  for (const int face : map.cad_face) map.names.push_back(fmt::format("face {}", face));
+  for (const int face : map.cad_face) map.names.push_back(io::face_label(face, cad_names));
   return map;
 }
 
@@ -64,8 +64,8 @@ std::string_view name_of(Verdict verdict) {
   return {};
 }
 
-FaceMap faces_of(const TriangleMesh& skin) {
-  if (!skin.cad_faces.empty()) return cad_faces_of(skin);
+FaceMap faces_of(const TriangleMesh& skin, const io::CadFaceNames& cad_names) {
+  if (!skin.cad_faces.empty()) return cad_faces_of(skin, cad_names);
   const std::vector<int> roots = smooth_pieces(skin);
   std::vector<double> area(roots.size(), 0.0);
   for (std::size_t i = 0; i < roots.size(); ++i) {

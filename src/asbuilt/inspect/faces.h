@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/io/cad_face_name.h"
 #include "asbuilt/inspect/spots.h"
 #include "asbuilt/inspect/statistics.h"
 #include "asbuilt/inspect/tolerance.h"
@@ -20,12 +21,13 @@ namespace asbuilt::inspect {
 struct FaceMap {
   std::vector<std::uint32_t> of_triangle;  ///< index of the face; one per triangle of the skin
   std::vector<int> cad_face;               ///< number in the CAD file; -1 for pieces of a mesh
-  std::vector<std::string> names;          ///< "face 12", "piece 3", "small pieces"
+  std::vector<std::string> names;          ///< "face 12", 'face 12 "bore A"', "piece 3", "small pieces"
 };
 
+/// Faces of a CAD model are called as `cad_names` has it.
 /// Faces of a mesh are pieces between edges of more than 30 degrees, largest first; those below 0.5 % of the area are
 /// taken together, as are all beyond the hundredth.
-[[nodiscard]] FaceMap faces_of(const TriangleMesh& skin);
+[[nodiscard]] FaceMap faces_of(const TriangleMesh& skin, const io::CadFaceNames& cad_names = {});
 
 /// One face or box and what was measured on it.
 struct SurfacePart {

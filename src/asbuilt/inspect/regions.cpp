@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/kd_tree.h"
@@ -14,7 +15,8 @@ namespace {
 constexpr double kNeighbourSpacings = 1.6;
 constexpr float kSameSideCosine = 0.5F;
 constexpr std::size_t kLeastSpots = 3;
-constexpr double kPeakReachSpacings = 3.0;
+constexpr double kLeastPeakReachSpacings = 1.5, kMostPeakReachSpacings = 3.0;
+constexpr double kLeastPeakReachPointSpacings = 5.0;  // some 80 points tell how rough a surface is
 
 /// A spot that deviates too far, and to which side.
 struct Outlier {
@@ -84,9 +86,11 @@ std::vector<Region> regions_out_of(const PointCloud& places, std::span<const Spo
     region.area_mm2 = static_cast<double>(members.size()) * options.spot_area_mm2;
     region.limit_mm = peak->limit;
     region.face = most_frequent(region.spots, face_of_spot);
-    // A paraboloid fits a small dent only within the dent.
-    const double extent = std::sqrt(region.area_mm2 / 3.14);
-    const double reach = std::clamp(0.7 * extent, 1.2 * options.spacing_mm, kPeakReachSpacings * options.spacing_mm);
+    // The dent and its flanks, which tell how rough the surface is there.
+    const double extent = std::sqrt(region.area_mm2 / std::numbers::pi);
+    const double wanted = std::clamp(2.0 * extent, kLeastPeakReachSpacings * options.spacing_mm,
+                                     kMostPeakReachSpacings * options.spacing_mm);
+    const double reach = std::max(wanted, kLeastPeakReachPointSpacings * finder.spacing_mm());
     region.peak = finder.peak_near(places.positions[peak->spot], places.normals[peak->spot], peak->side, reach,
                                    spots[peak->spot]);
     const double excess = peak->side * (region.peak.deviation_mm - region.limit_mm);

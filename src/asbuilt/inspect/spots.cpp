@@ -7,72 +7,29 @@
 #include <cmath>
 #include <numbers>
 
-#include "asbuilt/core/cube_rows.h"
 #include "asbuilt/core/parallel.h"
-#include "asbuilt/inspect/paraboloid.h"
+#include "asbuilt/inspect/extremum.h"
+#include "asbuilt/inspect/witnesses.h"
 
 namespace asbuilt::inspect {
 namespace {
 
-constexpr float kSameSideCosine = 0.5F;       // foot and place lie on faces turned by less than 60 degrees
 constexpr float kRoundTheEdgeCosine = -0.5F;  // on faces that meet in an edge; turned further it may be the other wall
-// Of a point's own normal and its face: 75 degrees, as normals at edges are rounded.
-constexpr float kOwnFaceCosine = 0.25F;
 constexpr std::size_t kAround = 6;   // points that tell the spacing about a place
 constexpr double kOwnReach = 0.6;    // in spacings: discs about the points of a rim then reach half of one beyond it
 constexpr double kEdgeReach = 0.85;  // in spacings, at an edge that the points go round: rows end anywhere before it
 constexpr double kInnerReach = 1.1;  // in spacings, among points on all sides: no hole of a scattered cloud is wider
 constexpr double kHalfDisc = 0.75;   // half a disc, and what the square of the spacing misses of it at a rim
 constexpr double kMeanReach = 1.5;   // in spacings: the mean takes in the next neighbours at least
-constexpr double kOwnRadius = 0.75;  // of the radius that is asked for: neighbouring spots just overlap
 constexpr double kDetailSpacings = 5.0;  // radius of some 80 points
 constexpr double kPriorWeight = 8.0;     // points' worth of belief in the cloud's overall noise
 constexpr double kOutlier = 3.5;         // in noise sigmas, from the median
-constexpr std::size_t kGrain = 1 << 14;
+constexpr double kCentred = 0.25;        // of the reach: a top so near to the middle has surroundings on all sides
 
-/// What one point says, in the order of the grid.
-struct Witness {
-  Eigen::Vector3f foot = Eigen::Vector3f::Zero(), normal = Eigen::Vector3f::Zero();
-  float deviation = 0.0F, sigma = 0.0F;
-  std::uint16_t scan = Spot::kNoScan, support = 1;
-};
-
-struct Near {
-  float squared_distance = 0.0F;
-  std::uint32_t witness = 0;
-};
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
-/// The indices below `count` that a test holds for, ascending.
-template <class Test>
-std::vector<std::uint32_t> chosen_of(std::size_t count, const Context& context, const Test& test) {
-  std::vector<std::size_t> starts((count + kGrain - 1) / kGrain + 1, 0);
-  parallel_for_blocks(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
-    std::size_t here = 0;
-    for (std::size_t i = begin; i < end; ++i) here += test(i) ? 1 : 0;
-    starts[begin / kGrain + 1] = here;
-  });
-  for (std::size_t block = 1; block < starts.size(); ++block) starts[block] += starts[block - 1];
-  std::vector<std::uint32_t> chosen(starts.back());
-  parallel_for_blocks(context, count, kGrain, [&](std::size_t begin, std::size_t end) {
-    std::size_t place = starts[begin / kGrain];
-    for (std::size_t i = begin; i < end; ++i) {
-      if (test(i)) chosen[place++] = static_cast<std::uint32_t>(i);
-    }
-  });
-  return chosen;
-}
-
-/// Two directions across a normal.
-std::array<Eigen::Vector3f, 2> tangents(const Eigen::Vector3f& normal) {
-  const Eigen::Vector3f first = normal.unitOrthogonal();
-  return {first, normal.cross(first)};
+std::size_t nearest_to(const Eigen::Vector2d& place, const std::vector<Eigen::Vector3d>& heights) {
+  const auto nearest = std::ranges::min_element(
+      heights, {}, [&](const Eigen::Vector3d& p) { return (p.head<2>() - place).squaredNorm(); });
+  return static_cast<std::size_t>(nearest - heights.begin());
 }
 
 /// How far the points may be that speak for a place.
@@ -90,111 +47,13 @@ struct Scratch {
 
 }  // namespace
 
-struct SpotFinder::Implementation {
-  std::vector<Witness> witnesses;
-  std::unique_ptr<CubeRows> cubes;
+struct SpotFinder::Implementation : Witnesses {
   std::vector<ScanPose> poses;
-  double radius = 0.0, spacing = 0.0, noise = 0.0;
 
-  Implementation(const Measurement& m, const Pose& model_from_cloud, const Feet& all, const model::PreparedModel& model,
-                 double radius_mm, double max_distance_mm, const Context& context)
-      : poses(m.poses.begin(), m.poses.end()), radius(radius_mm) {
-    const Eigen::Matrix3f rotation = model_from_cloud.linear().cast<float>();
-    const std::vector<std::uint32_t> chosen = chosen_of(m.cloud.size(), context, [&](std::size_t i) {
-      if (!(std::abs(all.deviation_mm[i]) <= max_distance_mm)) return false;
-      // The other wall of a thin sheet can be nearer; a point's own normal tells which wall it was measured on.
-      return !m.cloud.has_normals() ||
-             (rotation * m.cloud.normals[i]).dot(model.face_normals[all.triangles[i]]) >= 0.0F;
-    });
-    std::vector<Eigen::Vector3f> feet(chosen.size());
-    parallel_for(context, feet.size(), kGrain, [&](std::size_t k) { feet[k] = all.points[chosen[k]]; });
-    cubes = std::make_unique<CubeRows>(feet, std::max(0.5 * radius, 1e-6 * model.diameter));
-    const auto order = cubes->order();
-    witnesses.resize(order.size());
-    parallel_for(context, order.size(), kGrain, [&](std::size_t place) {
-      const std::uint32_t i = chosen[order[place]];
-      Witness& w = witnesses[place];
-      w.foot = feet[order[place]];
-      w.normal = model.face_normals[all.triangles[i]];
-      w.deviation = all.deviation_mm[i];
-      if (!m.sigma_mm.empty()) w.sigma = m.sigma_mm[i];
-      if (!m.scan.empty()) w.scan = m.scan[i];
-      if (!m.support.empty()) w.support = m.support[i];
-    });
-    spacing = median_distance(model.diameter);
-    noise = overall_noise();
-  }
-
-  void gather(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double reach, std::vector<Near>& near,
-              float least_cosine = kSameSideCosine) const {
-    near.clear();
-    const auto radius_f = static_cast<float>(reach);
-    cubes->around(position, radius_f, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Witness& w = witnesses[i];
-        const float squared = (w.foot - position).squaredNorm();
-        if (squared <= radius_f * radius_f && w.normal.dot(normal) > least_cosine) {
-          near.push_back({squared, static_cast<std::uint32_t>(i)});
-        }
-      }
-    });
-  }
-
-  /// Median distance of a point to its nearest neighbour, without a tree over all of them.
-  [[nodiscard]] double median_distance(double diameter) const {
-    constexpr std::size_t kProbes = 1000;
-    std::vector<double> distances;
-    const std::size_t probes = std::min(kProbes, witnesses.size());
-    for (std::size_t probe = 0; probe < probes; ++probe) {
-      const std::size_t place = probe * witnesses.size() / probes;
-      float squared = std::numeric_limits<float>::infinity();
-      for (double reach = 0.25 * radius; reach < diameter; reach *= 4.0) {
-        cubes->around(witnesses[place].foot, static_cast<float>(reach), [&](std::size_t begin, std::size_t end) {
-          for (std::size_t i = begin; i < end; ++i) {
-            if (i != place) squared = std::min(squared, (witnesses[i].foot - witnesses[place].foot).squaredNorm());
-          }
-        });
-        if (static_cast<double>(squared) <= reach * reach) break;  // what lies beyond is further
-      }
-      if (std::isfinite(squared)) distances.push_back(std::sqrt(static_cast<double>(squared)));
-    }
-    return distances.empty() ? 0.0 : median_of(distances);
-  }
-
-  /// The scatter of points about a plane through their neighbours, over evenly chosen probes.
-  [[nodiscard]] double overall_noise() const {
-    constexpr std::size_t kProbes = 800;
-    std::vector<double> spreads;
-    std::vector<Near> near;
-    const std::size_t probes = std::min(kProbes, witnesses.size());
-    for (std::size_t probe = 0; probe < probes; ++probe) {
-      const Witness& at = witnesses[probe * witnesses.size() / probes];
-      gather(at.foot, at.normal, std::min(radius, std::max(3.0 * spacing, 0.25 * radius)), near);
-      if (near.size() < 8) continue;
-      const double squares = squares_about_plane(at.foot, at.normal, near);
-      spreads.push_back(std::sqrt(squares / static_cast<double>(near.size() - 3)));
-    }
-    return spreads.empty() ? 0.0 : median_of(spreads);
-  }
-
-  /// Sum of squared deviations about the best linear function of the place.
-  [[nodiscard]] double squares_about_plane(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
-                                           const std::vector<Near>& near) const {
-    const auto across = tangents(normal);
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-    double squares = 0.0;
-    for (const Near& n : near) {
-      const Witness& w = witnesses[n.witness];
-      const Eigen::Vector3f offset = (w.foot - position) / static_cast<float>(radius);
-      const Eigen::Vector3d row(1.0, offset.dot(across[0]), offset.dot(across[1]));
-      information += row * row.transpose();
-      moment += static_cast<double>(w.deviation) * row;
-      squares += static_cast<double>(w.deviation) * static_cast<double>(w.deviation);
-    }
-    const Eigen::Vector3d fit = information.ldlt().solve(moment);
-    return std::max(0.0, squares - fit.dot(moment));
-  }
+  Implementation(const Measurement& measurement, const Pose& model_from_cloud, const Feet& feet,
+                 const model::PreparedModel& model, double radius_mm, double max_distance_mm, const Context& context)
+      : Witnesses(measurement, model_from_cloud, feet, model, radius_mm, max_distance_mm, context),
+        poses(measurement.poses.begin(), measurement.poses.end()) {}
 
   /// Whether the points lie on all sides of a place: no gap of half a turn between their directions.
   [[nodiscard]] bool is_surrounded(const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
@@ -301,7 +160,7 @@ struct SpotFinder::Implementation {
     variance = std::max(variance, stated / count);
     const double of_poses = pose_variance(position, normal, scratch.scans, count);
     if (variance > 0.0 || of_poses > 0.0) {
-      spot.standard_error_mm = static_cast<float>(std::sqrt(variance / count + of_poses));
+      spot.standard_error_mm = static_cast<float>(std::sqrt(variance * std::min(1.0, repetition / count) + of_poses));
     }
     return spot;
   }
@@ -372,28 +231,30 @@ Peak SpotFinder::peak_near(const Eigen::Vector3f& position, const Eigen::Vector3
                            const Spot& spot) const {
   Peak peak{position.cast<double>(), static_cast<double>(spot.deviation_mm),
             static_cast<double>(spot.standard_error_mm)};
-  std::vector<Near> near;
-  implementation_->gather(position, normal, reach_mm, near);
-  constexpr std::size_t kLeast = 20;
-  if (near.size() < kLeast) return peak;
-
   const auto across = tangents(normal);
-  std::vector<Eigen::Vector3d> points;
-  std::vector<std::pair<std::uint16_t, std::uint32_t>> scans;
-  for (const Near& n : near) {
-    const Witness& w = implementation_->witnesses[n.witness];
-    const Eigen::Vector3f offset = (w.foot - position) / static_cast<float>(reach_mm);
-    points.emplace_back(offset.cast<double>().dot(across[0].cast<double>()),
-                        offset.cast<double>().dot(across[1].cast<double>()), static_cast<double>(w.deviation));
-    Implementation::count_scan(scans, w.scan);
+  Eigen::Vector3f middle = position;
+  std::vector<Near> near;
+  std::vector<Eigen::Vector3d> heights;
+  for (int pass = 0; pass < 3; ++pass) {  // about the top that was found, so that its surroundings tell of it
+    implementation_->gather(middle, normal, reach_mm, near);
+    heights.clear();
+    std::vector<std::pair<std::uint16_t, std::uint32_t>> scans;
+    for (const Near& n : near) {
+      const Witness& w = implementation_->witnesses[n.witness];
+      const Eigen::Vector3f offset = w.foot - middle;
+      heights.emplace_back(offset.dot(across[0]), offset.dot(across[1]), w.deviation);
+      Implementation::count_scan(scans, w.scan);
+    }
+    const auto extremum = extremum_of(heights, sign, reach_mm);
+    if (!extremum) return peak;
+    const std::size_t nearest = nearest_to(extremum->place, heights);
+    middle = implementation_->witnesses[near[nearest].witness].foot;
+    peak.point = middle.cast<double>();
+    peak.deviation_mm = extremum->height;
+    const double of_poses = implementation_->pose_variance(middle, normal, scans, static_cast<double>(near.size()));
+    peak.standard_error_mm = std::sqrt(extremum->variance + of_poses);
+    if (extremum->place.norm() < kCentred * reach_mm) break;
   }
-  const auto extremum = extremum_of_paraboloid(points, sign);
-  if (!extremum) return peak;
-  peak.deviation_mm = extremum->height;
-  peak.standard_error_mm = std::sqrt(
-      extremum->variance + implementation_->pose_variance(position, normal, scans, static_cast<double>(near.size())));
-  const Eigen::Vector2d moved = reach_mm * extremum->place;
-  peak.point += moved.x() * across[0].cast<double>() + moved.y() * across[1].cast<double>();
   return peak;
 }
 

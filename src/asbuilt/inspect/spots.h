@@ -55,8 +55,9 @@ class SpotFinder {
   /// The same for pictures: from the nearest few dozen points only where there are many, so sharper and sooner there.
   [[nodiscard]] std::vector<Spot> detailed_at(const PointCloud& places, const Context& context) const;
 
-  /// The extremum (towards `sign`) of a paraboloid fitted to the points within `reach_mm` of a place: a mean over the
-  /// neighbourhood would level a narrow dent. Falls back on the spot where there are too few points.
+  /// The extremum (towards `sign`) of the surface that the points about a place were measured on (extremum.h): a mean
+  /// over the neighbourhood would level a narrow dent. `reach_mm` is how far it is looked for, and from how far around
+  /// it points are taken. Falls back on the spot where there are too few points.
   [[nodiscard]] Peak peak_near(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, double sign,
                                double reach_mm, const Spot& spot) const;
 

@@ -39,7 +39,9 @@ Result<Tolerance> tolerance_of(const io::Input& input, std::size_t line, double 
 /// Adds a row, or says that its face or name was there before.
 Result<void> add(ToleranceTable& table, ToleranceRow row, const io::Input& input, std::size_t line) {
   for (const ToleranceRow& other : table.rows) {
-    const bool same = row.face ? row.face == other.face : !other.face && row.name == other.name;
+    const bool is_face = row.box == std::nullopt, other_is_face = other.box == std::nullopt;
+    const bool same = is_face == other_is_face && row.face == other.face && row.face_name == other.face_name &&
+                      (is_face || row.name == other.name);
     if (!same) continue;
     return input.error_at_line(line, fmt::format("{} is given a second tolerance; the first is on line {}",
                                                  io::in_quotes(row.name), other.place));
@@ -90,9 +92,14 @@ Result<void> read_line(ToleranceTable& table, const io::Input& input, std::size_
     row.name = fmt::format("face {}", *row.face);
     return add(table, std::move(row), input, line);
   }
-  return input.error_at_line(line, fmt::format("found {}, expected the number of a CAD face, or * for all others (a "
-                                               "named box needs two corners: {})",
-                                               io::in_quotes(name), kShapes));
+  if (name.empty()) {
+    return input.error_at_line(line,
+                               fmt::format("the row names no face, expected the number or the name of a CAD face, "
+                                           "or * for all others (a named box needs two corners: {})",
+                                           kShapes));
+  }
+  row.face_name = name;  // whether the CAD has such a face is seen when it is there
+  return add(table, std::move(row), input, line);
 }
 
 Result<ToleranceTable> read_csv(const io::Input& input) {
@@ -165,12 +172,16 @@ Result<void> read_entry(ToleranceTable& table, const io::Input& input, std::size
   if (has_face) {
     const Json& face = entry["face"];
     if (face.is_number_unsigned() && face.get<std::uint64_t>() < 100'000'000) row.face = face.get<int>();
-    if (face.is_string()) row.face = face_number(face.get<std::string>());
-    if (!row.face) {
-      return input.error_at_line(
-          line, fmt::format("\"face\" is {}, expected the number of a CAD face, from 0", io::in_quotes(face.dump())));
+    if (face.is_string()) {
+      row.face = face_number(face.get<std::string>());
+      if (!row.face) row.face_name = face.get<std::string>();
     }
-    if (row.name.empty()) row.name = fmt::format("face {}", *row.face);
+    if (!row.face && row.face_name.empty()) {
+      return input.error_at_line(line,
+                                 fmt::format("\"face\" is {}, expected the number of a CAD face, from 0, or its name",
+                                             io::in_quotes(face.dump())));
+    }
+    if (row.name.empty()) row.name = row.face ? fmt::format("face {}", *row.face) : row.face_name;
     return add(table, std::move(row), input, line);
   }
   const Json& box = entry["box"];
@@ -219,6 +230,7 @@ Result<ToleranceTable> tolerances_in(std::string_view content, const std::string
   const std::size_t first = content.find_first_not_of(" \t\r\n\xef\xbb\xbf");
   const bool is_json = first != std::string_view::npos && (content[first] == '{' || content[first] == '[');
   auto table = is_json ? read_json(input) : read_csv(input);
+  if (table) table->source = name;
   if (table && !table->others && table->rows.empty()) {
     return input.error(fmt::format("the file holds no tolerance, expected lines {}", kShapes));
   }

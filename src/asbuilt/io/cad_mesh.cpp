@@ -13,10 +13,12 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <unordered_map>
 #include <utility>
 
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/polygons.h"
+#include "asbuilt/io/step_text.h"
 
 // The library's headers are not ours to mend.
 #pragma GCC diagnostic push
@@ -40,11 +42,20 @@
 #include <Poly_Triangulation.hxx>
 #include <STEPControl_Reader.hxx>
 #include <Standard_Failure.hxx>
+#include <StepBasic_Product.hxx>
+#include <StepBasic_ProductDefinition.hxx>
+#include <StepBasic_ProductDefinitionFormation.hxx>
+#include <StepShape_FaceSurface.hxx>
 #include <TColStd_SequenceOfAsciiString.hxx>
 #include <TopExp_Explorer.hxx>
 #include <TopoDS.hxx>
 #include <TopoDS_Face.hxx>
+#include <TopoDS_Iterator.hxx>
 #include <TopoDS_Shape.hxx>
+#include <TransferBRep.hxx>
+#include <Transfer_TransientProcess.hxx>
+#include <XSControl_TransferReader.hxx>
+#include <XSControl_WorkSession.hxx>
 #pragma GCC diagnostic pop
 
 namespace asbuilt::io {
@@ -73,6 +84,7 @@ struct CadShape {
   TopoDS_Shape shape;
   std::optional<double> stated_mm;  ///< millimetres in the unit that the file states
   std::string stated_name;
+  CadFaceNames face_names;
 };
 
 std::optional<double> millimetres_in(std::string name) {
@@ -86,6 +98,68 @@ std::optional<double> millimetres_in(std::string name) {
     if (name == known) return millimetres;
   }
   return std::nullopt;
+}
+
+using NamesOfShapes = std::unordered_map<const TopoDS_TShape*, std::string>;
+
+std::string name_in(const Handle(TCollection_HAsciiString) & text) {
+  return text.IsNull() ? std::string() : clean_cad_name(decoded_step_text(text->ToCString()));
+}
+
+/// What the file says of the shapes that came of it: the first string of a face, and the product of a part.
+struct NamesInStep {
+  NamesOfShapes of_faces, of_parts;
+
+  explicit NamesInStep(const Handle(Transfer_TransientProcess) & transferred) {
+    for (int i = 1; i <= transferred->NbMapped(); ++i) {
+      const Handle(Standard_Transient) entity = transferred->Mapped(i);
+      const auto face = Handle(StepShape_FaceSurface)::DownCast(entity);
+      const auto part = Handle(StepBasic_ProductDefinition)::DownCast(entity);
+      if (face.IsNull() && part.IsNull()) continue;
+      const TopoDS_Shape shape = TransferBRep::ShapeResult(transferred, entity);
+      if (shape.IsNull()) continue;
+      const std::string name = face.IsNull() ? product_of(part) : name_in(face->Name());
+      if (!name.empty()) (face.IsNull() ? of_parts : of_faces).emplace(shape.TShape().get(), name);
+    }
+  }
+
+ private:
+  static std::string product_of(const Handle(StepBasic_ProductDefinition) & definition) {
+    const auto formation = definition->Formation();
+    if (formation.IsNull() || formation->OfProduct().IsNull()) return {};
+    const std::string name = name_in(formation->OfProduct()->Name());
+    return name.empty() ? name_in(formation->OfProduct()->Id()) : name;
+  }
+};
+
+/// Goes through the faces of a shape in the order of TopExp_Explorer, and knows in which part each of them lies.
+void collect_names(const TopoDS_Shape& shape, const NamesInStep& names, const std::string& part, CadFaceNames& found) {
+  const auto known = [&](const NamesOfShapes& of) {
+    const auto place = of.find(shape.TShape().get());
+    return place == of.end() ? std::string() : place->second;
+  };
+  if (shape.ShapeType() == TopAbs_FACE) {
+    found.push_back({known(names.of_faces), part});
+    return;
+  }
+  std::string here = known(names.of_parts);
+  if (here.empty()) here = part;
+  for (TopoDS_Iterator inner(shape); inner.More(); inner.Next()) collect_names(inner.Value(), names, here, found);
+}
+
+/// Of a file with one part only, that part's name says nothing of a face.
+CadFaceNames face_names_of(const TopoDS_Shape& shape, const Handle(Transfer_TransientProcess) & transferred) {
+  const NamesInStep names(transferred);
+  CadFaceNames found;
+  collect_names(shape, names, {}, found);
+  const bool is_assembly =
+      std::ranges::any_of(found, [&](const auto& face) { return face.part != found.front().part; });
+  if (!is_assembly) {
+    for (CadFaceName& face : found) face.part.clear();
+  }
+  const auto is_named = [](const CadFaceName& face) { return !face.name.empty() || !face.part.empty(); };
+  if (std::ranges::none_of(found, is_named)) found.clear();
+  return found;
 }
 
 Result<CadShape> read_step(const Input& input) {
@@ -116,6 +190,7 @@ Result<CadShape> read_step(const Input& input) {
         "(AP203, AP214, AP242), or as STL");
   }
   cad.shape = reader.OneShape();
+  if (!cad.shape.IsNull()) cad.face_names = face_names_of(cad.shape, reader.WS()->TransferReader()->TransientProcess());
   return cad;
 }
 
@@ -323,6 +398,7 @@ Result<ModelFile> read_cad(const std::filesystem::path& path, FileKind kind, con
     ASBUILT_TRY(model, tessellated(input, cad.shape, options.tessellation_tolerance));
     model.format = name_of(kind);
     model.is_cad = true;
+    if (cad.face_names.size() == model.cad_faces) model.face_names = std::move(cad.face_names);
     const double scale = settle_unit(cad, options.unit, model);
     for (Eigen::Vector3d& vertex : model.mesh.vertices) vertex *= scale;
     return std::move(model);

@@ -10,6 +10,7 @@
 
 #include "asbuilt/core/result.h"
 #include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/io/cad_face_name.h"
 #include "asbuilt/io/unit.h"
 
 namespace asbuilt::io {
@@ -29,6 +30,7 @@ struct ModelFile {
   std::string format;                        ///< for example "stl binary", "step"
   bool is_cad = false;                       ///< surfaces that were tessellated here, not a mesh
   std::size_t cad_faces = 0, cad_parts = 0;  ///< faces, and solids or shells, with every use in an assembly counted
+  CadFaceNames face_names;                   ///< of STEP files, as far as they name faces or parts
   Unit unit = Unit::millimetre;              ///< in which the file was taken to be
   std::vector<std::string> notes;            ///< what should be known, a sentence each
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -83,6 +84,7 @@ FolderWatch::FolderWatch(FolderWatch&& other) noexcept
       settle_(other.settle_),
       descriptor_(std::exchange(other.descriptor_, -1)),
       lost_(other.lost_),
+      watched_(other.watched_),
       candidates_(std::move(other.candidates_)),
       known_(std::move(other.known_)),
       told_(std::move(other.told_)),
@@ -97,8 +99,25 @@ bool FolderWatch::start() {
   descriptor_ = ::inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
   if (descriptor_ < 0 || ::inotify_add_watch(descriptor_, folder_.c_str(), kEvents) < 0) return false;
   lost_ = false;
+  watched_ = identity().value_or(Identity{});
   list_folder();  // after the watch began, so that nothing falls between the two
   return true;
+}
+
+std::optional<FolderWatch::Identity> FolderWatch::identity() const {
+  struct stat found {};
+  if (::stat(folder_.c_str(), &found) != 0 || !S_ISDIR(found.st_mode)) return std::nullopt;
+  return Identity{found.st_dev, found.st_ino};
+}
+
+// A disk that is put over the watched folder, or taken off, tells nobody who watches what lies under it.
+void FolderWatch::look_for_folder() {
+  const auto found = identity();
+  if (!found || *found != watched_) lost_ = true;
+  if (!lost_ || !found) return;
+  std::error_code error;
+  const bool is_left_behind = found->device != watched_.device && !known_.empty() && fs::is_empty(folder_, error);
+  if (!is_left_behind && !start()) lost_ = true;
 }
 
 // Also when events were lost (the queue is finite): what is there, and what is no longer.
@@ -110,9 +129,7 @@ void FolderWatch::list_folder() {
     if (!entry->is_regular_file(of_file)) continue;
     present.insert(entry->path().filename().string());
   }
-  for (const std::string& file : present) {
-    if (!known_.contains(file)) touched(file, false);
-  }
+  for (const std::string& file : present) touched(file, false);  // a known one may have changed meanwhile
   const std::set<std::string> before = known_;
   for (const std::string& file : before) {
     if (!present.contains(file)) vanished(file);
@@ -189,8 +206,7 @@ std::vector<FileEvent> FolderWatch::wait(std::chrono::milliseconds timeout) {
   const auto until = Clock::now() + timeout;
   std::vector<FileEvent> events;
   for (;;) {
-    std::error_code error;
-    if (lost_ && (!fs::is_directory(folder_, error) || !start())) lost_ = true;
+    look_for_folder();
     read_events();
     events = std::exchange(pending_, {});
     take_settled(events);

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -45,7 +47,8 @@ class FolderWatch {
   /// Waits up to `timeout` for events; empty if there were none. Ready files in order of name.
   [[nodiscard]] std::vector<FileEvent> wait(std::chrono::milliseconds timeout);
 
-  /// Whether the folder itself is gone (deleted, moved, unmounted); looked for again at every wait.
+  /// Whether the folder itself is gone (deleted, moved, its disk taken off); looked for again at every wait. The empty
+  /// folder that a disk leaves behind is not taken for it: the files of a disk that is off are not deleted.
   [[nodiscard]] bool is_lost() const { return lost_; }
 
  private:
@@ -58,7 +61,14 @@ class FolderWatch {
 
   FolderWatch(std::filesystem::path folder, std::chrono::milliseconds settle)
       : folder_(std::move(folder)), settle_(settle) {}
+  struct Identity {
+    std::uint64_t device = 0, inode = 0;
+    bool operator==(const Identity&) const = default;
+  };
+
   [[nodiscard]] bool start();
+  [[nodiscard]] std::optional<Identity> identity() const;
+  void look_for_folder();
   void read_events();
   void list_folder();
   void touched(const std::string& file, bool closed);
@@ -69,6 +79,7 @@ class FolderWatch {
   std::chrono::milliseconds settle_;
   int descriptor_ = -1;
   bool lost_ = false;
+  Identity watched_;  // what was watched last under this path
   std::map<std::string, Candidate> candidates_;
   std::set<std::string> known_, told_;
   std::vector<FileEvent> pending_;

@@ -168,6 +168,11 @@ Result<void> ScanStore::commit(const std::string& file, io::RunRecord record, st
   return {};
 }
 
+void ScanStore::abandon() {
+  std::error_code ignored;
+  fs::remove_all(folder_ / "unfinished", ignored);
+}
+
 Result<void> ScanStore::erase(const std::string& file) {
   std::error_code error;
   const fs::path old = folder_ / "replaced";

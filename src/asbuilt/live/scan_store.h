@@ -40,6 +40,8 @@ class ScanStore {
   [[nodiscard]] Result<std::filesystem::path> begin(const std::string& file);
   /// Puts it in place of what there was. Errors: unwritable_output; then nothing has changed.
   [[nodiscard]] Result<void> commit(const std::string& file, io::RunRecord record, std::optional<SensorLimits> limits);
+  /// Gives up what was begun and frees its room on the disk.
+  void abandon();
   [[nodiscard]] Result<void> erase(const std::string& file);
 
   /// Files that were taken out, with the sha256 of the content that stays out.

@@ -8,6 +8,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/live/session_implementation.h"
+#include "asbuilt/live/words.h"
 
 namespace asbuilt::live {
 namespace {
@@ -163,6 +164,21 @@ void LiveSession::note(const std::string& level, const std::string& file, const 
   implementation_->publish_light(on_change, [&](LiveState& state) {
     state.notes.push_back({state.revision + 1, level, file, text});
     if (state.notes.size() > kMostNotes) state.notes.erase(state.notes.begin());
+  });
+}
+
+void LiveSession::set_trouble(const std::string& what, const Trouble& trouble) {
+  implementation_->publish_light(on_change, [&](LiveState& state) {
+    state.troubles[what] = trouble;
+    set_now(state);
+  });
+}
+
+void LiveSession::end_trouble(const std::string& what) {
+  if (!implementation_->next.troubles.contains(what)) return;
+  implementation_->publish_light(on_change, [&](LiveState& state) {
+    state.troubles.erase(what);
+    set_now(state);
   });
 }
 

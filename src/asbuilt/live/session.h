@@ -72,6 +72,10 @@ class LiveSession {
 
   /// Something to tell that no scan tells.
   void note(const std::string& level, const std::string& file, const std::string& text);
+  /// Something keeps the session from its work: the big line says so, until it is over. `what` tells one trouble from
+  /// another.
+  void set_trouble(const std::string& what, const Trouble& trouble);
+  void end_trouble(const std::string& what);
   void set_phase(const std::string& phase, const std::string& busy_with = {});
   void set_watch(const std::string& folder);
 

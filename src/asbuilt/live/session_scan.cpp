@@ -150,6 +150,8 @@ Result<void> LiveSession::add(const std::string& path) {
   pipeline::ScanHalf half = own.shared.half(own.model, own.options.pipeline);
   ASBUILT_TRY(folder, own.store->begin(file));
   bool told = false;
+  std::optional<FileEntries> before;  // of an earlier content, which stays if this one cannot be stored
+  if (const auto known = own.files.find(file); known != own.files.end()) before = known->second;
   std::vector<Entry> found_early;  // of all scans of the file so far
   half.early_verdict = [&](const io::ScanFile& scan, std::span<const pipeline::JudgedScan> judged) {
     std::ranges::move(own.early_entries(input, scan, judged), std::back_inserter(found_early));
@@ -190,7 +192,11 @@ Result<void> LiveSession::add(const std::string& path) {
     return own.store->commit(file, *made, group.limits);
   };
   if (auto taken = take_in(); !taken) {
-    if (told && own.files.contains(file)) own.erase(file);
+    own.store->abandon();
+    if (told) {
+      own.erase(file);
+      if (before) own.show(file, std::move(*before));
+    }
     own.next.phase = "waiting";
     own.next.busy_with.clear();
     own.publish(on_change);
@@ -210,9 +216,9 @@ Result<void> LiveSession::add(const std::string& path) {
   own.next.busy_with.clear();
   own.next.refinement = "due";
   own.publish(on_change, told ? std::string() : sound);
-  const SensorLimits before = own.planner->limits();
+  const SensorLimits reckoned_with = own.planner->limits();
   own.learn_sensor();
-  if (!(own.planner->limits() == before)) own.publish(on_change);
+  if (!(own.planner->limits() == reckoned_with)) own.publish(on_change);
   return own.add_former_copy_of(file, *this);
 }
 

@@ -168,7 +168,7 @@ void LiveSession::Implementation::describe_surface(LiveState& state, const Surfa
     HoleState shown_hole;
     shown_hole.reachable = seen > 0.2 * hole.area_mm2;
     hole.vertices.clear();
-    shown_hole.text = hole_in_words(hole);
+    shown_hole.text = hole_in_words(hole, model.prepared.face_names);
     if (!shown_hole.reachable) shown_hole.text += ", which no position outside the part sees";
     shown_hole.hole = std::move(hole);
     state.holes.push_back(std::move(shown_hole));
@@ -179,11 +179,10 @@ std::pair<LiveState, SurfaceValues> LiveSession::Implementation::composed() cons
   LiveState state = next;
   std::vector<const Entry*> entries;
   std::map<const Entry*, int> index;
-  int newest = -1;
   for (const auto& [file, group] : files) {
     for (const Entry& entry : group.entries) {
       index[&entry] = static_cast<int>(entries.size());
-      if (file == latest) newest = std::max(newest, index[&entry]);
+      if (file == latest) state.newest = std::max(state.newest, index[&entry]);
       entries.push_back(&entry);
       state.scans.push_back(scan_state(file, group, entry));
     }
@@ -197,7 +196,7 @@ std::pair<LiveState, SurfaceValues> LiveSession::Implementation::composed() cons
   for (std::size_t i = 0; i < state.scans.size(); ++i) {
     state.scans[i].sentence = sentence_for(state, i);
   }
-  set_now(state, newest);
+  set_now(state);
   return {std::move(state), std::move(values)};
 }
 

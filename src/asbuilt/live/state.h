@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -76,11 +77,17 @@ struct Note {
   std::string level, file, text;
 };
 
+/// Something that keeps the session from its work until it is over.
+struct Trouble {
+  std::string headline;  ///< what it is, in a few words
+  std::string detail;    ///< why, and what will happen
+};
+
 struct LiveState {
   std::uint64_t revision = 0, surface_revision = 0;
   std::string phase = "preparing";
   std::string busy_with;  ///< empty: nothing
-  std::string now_level = "act", now_text, now_sound;
+  std::string now_level = "act", now_headline, now_text, now_sound;
   io::ModelRecord model;
   Eigen::AlignedBox3d box;
   int faces = 0;
@@ -88,6 +95,7 @@ struct LiveState {
   double covered_share = 0.0, twice_share = 0.0, total_area_mm2 = 0.0;
   std::optional<double> coverable_share;
   std::vector<ScanState> scans;
+  int newest = -1;  ///< the scan that came last, unless it is gone
   std::vector<LinkState> links;
   std::vector<PieceState> pieces;
   std::vector<HoleState> holes;
@@ -96,6 +104,7 @@ struct LiveState {
   std::string refinement = "none";
   int refined_scans = 0, dropped_scans = 0;
   std::optional<double> refinement_rms_mm;
+  std::map<std::string, Trouble> troubles;  ///< by what is in trouble
   std::vector<Note> notes;
   std::vector<std::string> removed;
   std::vector<std::pair<std::string, std::string>> duplicates;  ///< file, of which

@@ -38,15 +38,19 @@ const std::string& name_of(const LiveState& state, int scan) {
   return state.scans[static_cast<std::size_t>(scan)].record.name;
 }
 
+struct Why {
+  std::string what, detail;  // the detail may be empty
+};
+
 // What is known, without a guess at what is not.
-std::string why_not_used(const io::ScanRecord& record) {
-  if (record.status == io::ScanStatus::failed) return fmt::format("could not be read: {}", record.reason);
-  if (record.status == io::ScanStatus::ambiguous) return fmt::format("the pose is ambiguous: {}", record.reason);
-  if (record.status == io::ScanStatus::dropped) return fmt::format("contradicts the other scans: {}", record.reason);
-  if (record.reason_code == "excluded") return record.reason;
-  if (record.reason_code == "scan_too_small" || record.reason_code == "wrong_unit") return record.reason;
-  if (record.candidates.empty()) return "the part was not found in it: nothing in it resembles the part";
-  return fmt::format("the part was not found in it: the best match was refused ({})", record.reason);
+Why why_not_used(const io::ScanRecord& record) {
+  if (record.status == io::ScanStatus::failed) return {"could not be read", record.reason};
+  if (record.status == io::ScanStatus::ambiguous) return {"the pose is ambiguous", record.reason};
+  if (record.status == io::ScanStatus::dropped) return {"contradicts the other scans", record.reason};
+  if (record.reason_code == "excluded") return {record.reason, {}};
+  if (record.reason_code == "scan_too_small" || record.reason_code == "wrong_unit") return {record.reason, {}};
+  if (record.candidates.empty()) return {"the part was not found in it", "nothing in it resembles the part"};
+  return {"the part was not found in it", fmt::format("the best match was refused ({})", record.reason)};
 }
 
 }  // namespace
@@ -65,12 +69,12 @@ std::string side_in_words(const Eigen::Vector3d& outwards) {
   return fmt::format("{}, {:.0f}° {}", side, std::abs(elevation), elevation > 0 ? "above" : "below");
 }
 
-std::string hole_in_words(const Hole& hole) {
+std::string hole_in_words(const Hole& hole, const io::CadFaceNames& names) {
   const double cm2 = hole.area_mm2 / 100.0;
   std::string text = cm2 < 9.95 ? fmt::format("{:.1f} cm²", cm2) : fmt::format("{:.0f} cm²", cm2);
   text += fmt::format(" near ({:.0f}, {:.0f}, {:.0f})", hole.centre.x(), hole.centre.y(), hole.centre.z());
   if (!hole.normal.isZero()) text += ", facing " + side_in_words(hole.normal);
-  if (hole.face >= 0) text += fmt::format(", CAD face {}", hole.face);
+  if (hole.face >= 0) text += ", CAD " + io::face_label(hole.face, names);
   return text;
 }
 
@@ -91,7 +95,10 @@ std::string sentence_for(const LiveState& state, std::size_t scan) {
   const auto index = static_cast<int>(scan);
   const std::string& name = entry.record.name;
   const std::string early = entry.provisional ? " (first look, being confirmed)" : "";
-  if (!entry.in_use()) return fmt::format("{}: not used, {}{}.", name, why_not_used(entry.record), early);
+  if (!entry.in_use()) {
+    const auto [what, detail] = why_not_used(entry.record);
+    return fmt::format("{}: not used, {}{}{}{}.", name, what, detail.empty() ? "" : ": ", detail, early);
+  }
   const std::string brought = fmt::format("{} of the surface, {} of it new to the session",
                                           percent(entry.covered_share), percent(entry.new_share));
   std::string text = fmt::format("{}: accepted{}, {}", name, early, brought);
@@ -109,15 +116,22 @@ std::string sentence_for(const LiveState& state, std::size_t scan) {
   return text + ".";
 }
 
-void set_now(LiveState& state, int latest) {
-  const auto say = [&](const char* level, std::string text) {
+void set_now(LiveState& state) {
+  const auto say = [&](const char* level, std::string headline, const std::string& more = {}) {
     state.now_level = level;
-    state.now_text = std::move(text);
+    state.now_text = more.empty() ? headline : headline + " " + more;
+    state.now_headline = std::move(headline);
   };
-  const auto next = [&] { return state.views.empty() ? std::string() : " Next: " + state.views.front().text + "."; };
-  if (latest >= 0 && !state.scans[static_cast<std::size_t>(latest)].in_use()) {
-    const io::ScanRecord& record = state.scans[static_cast<std::size_t>(latest)].record;
-    return say("bad", fmt::format("{} is not used: {}.{}", record.name, why_not_used(record), next()));
+  const std::string next = state.views.empty() ? std::string() : "Next: " + state.views.front().text + ".";
+  if (!state.troubles.empty()) {
+    const Trouble& worst = state.troubles.begin()->second;
+    return say("bad", worst.headline, worst.detail);
+  }
+  if (state.newest >= 0 && !state.scans[static_cast<std::size_t>(state.newest)].in_use()) {
+    const io::ScanRecord& record = state.scans[static_cast<std::size_t>(state.newest)].record;
+    const auto [what, detail] = why_not_used(record);
+    return say("bad", fmt::format("{} is not used: {}.", record.name, what),
+               (detail.empty() ? "" : fmt::format("Why: {}. ", detail)) + next);
   }
   if (state.pieces.empty()) {
     return say("act",
@@ -125,25 +139,24 @@ void set_now(LiveState& state, int latest) {
   }
   if (state.pieces.size() > 1) {
     const PieceState& loose = state.pieces[1];
-    std::string text = fmt::format(
-        "In pieces: {} hang{} loose. ",
+    const std::string headline = fmt::format(
+        "In pieces: {} hang{} loose.",
         loose.scans.size() == 1 ? name_of(state, loose.scans.front()) : fmt::format("{} scans", loose.scans.size()),
         loose.scans.size() == 1 ? "s" : "");
     if (loose.join && loose.join->view >= 0) {
-      text += "To join: " + state.views[static_cast<std::size_t>(loose.join->view)].text + ".";
-    } else {
-      text += "No single view shows enough of both pieces; scan on from one piece towards the other." + next();
+      const ViewState& view = state.views[static_cast<std::size_t>(loose.join->view)];
+      return say("warn", headline, "To join: " + view.text + ".");
     }
-    return say("warn", text);
+    return say("warn", headline,
+               "No single view shows enough of both pieces; scan on from one piece towards the other. " + next);
   }
   if (state.views.empty()) {
-    return say("good", state.coverable_share
-                           ? fmt::format("Done: {} of the surface is scanned; no position would bring more than a "
-                                         "trifle.",
-                                         percent(state.covered_share))
-                           : fmt::format("{} of the surface is scanned.", percent(state.covered_share)));
+    const std::string share = percent(state.covered_share);
+    if (!state.coverable_share) return say("good", fmt::format("{} of the surface is scanned.", share));
+    return say("good", fmt::format("Done: {} of the surface is scanned.", share),
+               "No position would bring more than a trifle.");
   }
-  say("act", "Next: " + state.views.front().text + ".");
+  say("act", next);
 }
 
 std::vector<WeakDirection> weak_directions(const Matrix6d& covariance, const Eigen::Vector3d& centre,

@@ -14,7 +14,7 @@ namespace asbuilt::live {
 [[nodiscard]] std::string side_in_words(const Eigen::Vector3d& outwards);
 
 /// "120 cm² near (12, -80, 30), facing -y, CAD face 12".
-[[nodiscard]] std::string hole_in_words(const Hole& hole);
+[[nodiscard]] std::string hole_in_words(const Hole& hole, const io::CadFaceNames& names);
 
 /// "from +x, 20° above, 640 mm away: about 14 % new surface".
 [[nodiscard]] std::string view_in_words(const ViewProposal& proposal);
@@ -22,8 +22,9 @@ namespace asbuilt::live {
 /// One sentence on what became of a scan; its links are looked up in the state.
 [[nodiscard]] std::string sentence_for(const LiveState& state, std::size_t scan);
 
-/// Level, text and no sound of the one big line. `latest` is the scan that came last, or -1.
-void set_now(LiveState& state, int latest);
+/// Level, headline and text of the one big line: a trouble first, then what became of the newest scan, then what to do.
+/// The text begins with the headline, which is short enough to be read from where the scanner stands.
+void set_now(LiveState& state);
 
 /// The directions in which a pose is held much worse than in the others, about `centre`, at most two.
 [[nodiscard]] std::vector<WeakDirection> weak_directions(const Matrix6d& covariance, const Eigen::Vector3d& centre,

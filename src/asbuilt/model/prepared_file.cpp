@@ -23,7 +23,7 @@ constexpr std::string_view kMagic(
     "\x89"
     "ASBUILT-MODEL\r\n",
     16);
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4, kVersionWithoutNames = 3;
 constexpr std::size_t kDigestSize = 64;                                                  // hexadecimal digits
 constexpr std::size_t kHeaderSize = 16 + sizeof(std::uint32_t) + sizeof(std::uint64_t);  // magic, version, body's size
 
@@ -112,10 +112,25 @@ std::string body_of(PreparedModel model) {
   writer.put(static_cast<std::uint64_t>(model.report.notes.size()));
   for (const std::string& note : model.report.notes) writer.put(note);
   write_symmetry(model.symmetry, writer);
+  writer.put(static_cast<std::uint64_t>(model.face_names.size()));
+  for (const io::CadFaceName& face : model.face_names) {
+    writer.put(face.name);
+    writer.put(face.part);
+  }
   return writer.bytes();
 }
 
-bool read_body(std::string_view body, PreparedModel& model) {
+void read_names(ByteReader& reader, io::CadFaceNames& names) {
+  std::uint64_t count = 0;
+  reader.get(count);
+  for (std::uint64_t i = 0; i < count && reader.ok(); ++i) {
+    io::CadFaceName& face = names.emplace_back();
+    reader.get(face.name);
+    reader.get(face.part);
+  }
+}
+
+bool read_body(std::string_view body, std::uint32_t version, PreparedModel& model) {
   ByteReader reader(body);
   transfer(model, [&](auto& member) { reader.get(member); });
   for (std::size_t* count : counts_of(model.report)) {
@@ -126,7 +141,9 @@ bool read_body(std::string_view body, PreparedModel& model) {
   std::uint64_t notes = 0;
   reader.get(notes);
   for (std::uint64_t i = 0; i < notes && reader.ok(); ++i) reader.get(model.report.notes.emplace_back());
-  return read_symmetry(reader, model.symmetry) && reader.at_end();
+  if (!read_symmetry(reader, model.symmetry)) return false;
+  if (version > kVersionWithoutNames) read_names(reader, model.face_names);
+  return reader.at_end();
 }
 
 template <class Points>
@@ -184,11 +201,11 @@ Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Con
   std::uint64_t size = 0;
   header.get(version);
   header.get(size);
-  if (version != kVersion) {
+  if (version != kVersion && version != kVersionWithoutNames) {
     return refuse(
-        fmt::format("the prepared model has format version {}, this program reads version {}; prepare it again "
-                    "with this program{}",
-                    version, kVersion, version > kVersion ? ", or use a newer one" : ""));
+        fmt::format("the prepared model has format version {}, this program reads versions {} and {}; prepare "
+                    "it again with this program{}",
+                    version, kVersionWithoutNames, kVersion, version > kVersion ? ", or use a newer one" : ""));
   }
   const std::size_t rest = content.size() - kHeaderSize;
   if (size > rest || rest - size != kDigestSize) {
@@ -201,7 +218,7 @@ Result<PreparedModel> load_prepared(const std::filesystem::path& path, const Con
     return refuse("the prepared model is damaged (its checksum does not match); prepare it again");
   }
   PreparedModel model;
-  if (!read_body(body, model) || !is_consistent(model)) {
+  if (!read_body(body, version, model) || !is_consistent(model)) {
     return refuse("the prepared model contradicts itself; prepare it again");
   }
   if (use == PreparedFor::inspection) {

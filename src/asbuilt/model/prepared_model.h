@@ -9,6 +9,7 @@
 #include "asbuilt/core/point_cloud.h"
 #include "asbuilt/core/result.h"
 #include "asbuilt/core/triangle_mesh.h"
+#include "asbuilt/io/cad_face_name.h"
 #include "asbuilt/model/distance_field.h"
 #include "asbuilt/model/ray_scene.h"
 #include "asbuilt/model/surface_distance.h"
@@ -57,6 +58,7 @@ struct PreparedModel {
   std::shared_ptr<const RayScene> rays;
   SymmetryGroup symmetry;  ///< the rotations that map the part onto itself, and those that nearly do
   PreparationReport report;
+  io::CadFaceNames face_names;  ///< of the CAD faces by the numbers of skin.cad_faces, set by whoever read them
   std::string source_path, source_sha256;  ///< of the file it came from, set by whoever read it; may be empty
 
   /// Whether a sensor may see faces from behind: sheets and shells without thickness have two sides.

@@ -19,6 +19,7 @@ Result<model::PreparedModel> prepared_from_file(const std::string& path, std::st
   // A mesh that cannot be a part is no readable input, whatever its syntax.
   if (!prepared) return fail(ErrorCode::unreadable_input, fmt::format("{}: {}", path, prepared.error().message));
   prepared->report.notes.insert(prepared->report.notes.begin(), file.notes.begin(), file.notes.end());
+  prepared->face_names = std::move(file.face_names);
   prepared->source_path = path;
   prepared->source_sha256 = std::move(sha256);
   return std::move(*prepared);

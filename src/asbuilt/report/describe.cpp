@@ -131,8 +131,20 @@ std::string verdict_reason(const ReportInput& input) {
     case inspect::Verdict::not_enough_data:
       return fmt::format("what was scanned is within tolerance, but that is {} of the surface; {} is required",
                          percent(deviations.coverage), percent(input.options.minimum_coverage));
-    case inspect::Verdict::pass:
-      return fmt::format("no face is out of tolerance; {} of the surface was scanned", percent(deviations.coverage));
+    case inspect::Verdict::pass: {
+      // A face that nobody judged has not passed, whatever the part as a whole did.
+      std::size_t judged = 0, asked = 0;
+      for (const auto* parts : {&deviations.faces, &deviations.boxes}) {
+        for (const inspect::SurfacePart& part : *parts) {
+          asked += part.verdict ? 1 : 0;
+          judged += part.verdict == inspect::Verdict::pass ? 1 : 0;
+        }
+      }
+      std::string reason =
+          fmt::format("no face is out of tolerance; {} of the surface was scanned", percent(deviations.coverage));
+      if (judged < asked) reason += fmt::format(", {} of {} faces too little to be judged", asked - judged, asked);
+      return reason;
+    }
   }
   return {};
 }

@@ -98,6 +98,7 @@ Json tolerances_json(const ReportInput& input) {
     Json entry{
         {"name", row.name}, {"low", json_number(row.tolerance.low_mm)}, {"high", json_number(row.tolerance.high_mm)}};
     entry["face"] = row.face ? Json(*row.face) : Json(nullptr);
+    entry["face_name"] = row.face_name.empty() ? Json(nullptr) : Json(row.face_name);
     entry["box"] = row.box ? Json{triple(row.box->min()), triple(row.box->max())} : Json(nullptr);
     rows.push_back(std::move(entry));
   }
@@ -174,7 +175,7 @@ std::string report_json(const ReportInput& input) {
                     {"over_points", statistics_json(input.deviations.over_points)},
                     {"histogram", histogram_json(input.deviations, colours.range_mm())},
                     {"colours", colours_json(colours)},
-                    {"faces", faces_json(input.deviations)},
+                    {"faces", faces_json(input.deviations, input.model.face_names)},
                     {"boxes", boxes_json(input.deviations)},
                     {"regions", regions_json(input.deviations)},
                     {"scans", scans_json(input)},

@@ -31,7 +31,7 @@ using Json = nlohmann::ordered_json;
 [[nodiscard]] Json colours_json(const ColourMap& colours);
 
 // Sections about pieces of it.
-[[nodiscard]] Json faces_json(const inspect::DeviationReport& deviations);
+[[nodiscard]] Json faces_json(const inspect::DeviationReport& deviations, const io::CadFaceNames& names);
 [[nodiscard]] Json boxes_json(const inspect::DeviationReport& deviations);
 [[nodiscard]] Json regions_json(const inspect::DeviationReport& deviations);
 

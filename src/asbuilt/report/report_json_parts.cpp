@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "asbuilt/io/json_text.h"
 #include "asbuilt/report/report_json.h"
 
@@ -31,11 +33,16 @@ Json part_json(const inspect::SurfacePart& part) {
 
 }  // namespace
 
-Json faces_json(const inspect::DeviationReport& deviations) {
+Json faces_json(const inspect::DeviationReport& deviations, const io::CadFaceNames& names) {
   Json faces = Json::array();
   for (std::size_t i = 0; i < deviations.faces.size(); ++i) {
     const inspect::SurfacePart& face = deviations.faces[i];
     Json entry{{"index", i}, {"cad_face", face.cad_face >= 0 ? Json(face.cad_face) : Json(nullptr)}};
+    const auto number = static_cast<std::size_t>(std::max(face.cad_face, 0));
+    const bool is_known = face.cad_face >= 0 && number < names.size();
+    const auto text = [&](const std::string& name) { return name.empty() ? Json(nullptr) : Json(name); };
+    entry["cad_name"] = is_known ? text(names[number].name) : Json(nullptr);
+    entry["cad_part"] = is_known ? text(names[number].part) : Json(nullptr);
     entry.update(part_json(face));
     faces.push_back(std::move(entry));
   }

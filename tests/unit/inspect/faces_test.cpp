@@ -64,6 +64,8 @@ TEST(FaceMap, TakesThoseOfTheCadWhereThereAreAny) {
   EXPECT_EQ(map.cad_face, (std::vector<int>{4, 9}));
   EXPECT_EQ(map.names[1], "face 9");
   EXPECT_EQ(map.of_triangle[3], 1U);
+  EXPECT_EQ(faces_of(cube, {{}, {}, {}, {}, {"rim", "lid"}}).names,
+            (std::vector<std::string>{"face 4 \"rim\" of lid", "face 9"}));
 }
 
 }  // namespace

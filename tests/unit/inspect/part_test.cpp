@@ -76,6 +76,40 @@ TEST(Spots, StateTheErrorThatTheyHave) {
   EXPECT_GT(report.coverage, 0.99);  // along edges noise takes some points to the other side
 }
 
+TEST(Spots, OfAMergedCloudKnowThatItsPointsShareTheirNoise) {
+  // Each point is the mean of the nine measurements within a step of it, as merging makes them: they scatter by a third
+  // of the noise, but the mean over a neighbourhood is no better known than before.
+  const double sigma = 0.2, step = 0.3;
+  constexpr std::size_t kRows = 340;
+  Random random(11, "merged", 0);
+  std::vector<double> raw(kRows * kRows);
+  for (double& value : raw) value = sigma * random.normal();
+  PointCloud cloud;
+  add_side(cloud, 2, true, step, [&](double a, double b) {
+    const auto row = static_cast<std::size_t>(a / step), column = static_cast<std::size_t>(b / step);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) sum += raw[(row + i) * kRows + column + j];
+    }
+    return sum / 9.0;
+  });
+  const DeviationReport report = inspect(cloud, cube(), {}, Context(2)).value();
+  EXPECT_LT(report.noise_sigma_mm, 0.4 * sigma);
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < report.spots.size(); ++i) {
+    const Eigen::Vector3d p = cube().dense_samples.positions[i].cast<double>();
+    if (!report.spots[i].is_scanned() || std::max(std::abs(p.x() - 50.0), std::abs(p.y() - 50.0)) > 45.0) continue;
+    const double pull = static_cast<double>(report.spots[i].deviation_mm / report.spots[i].standard_error_mm);
+    squares += pull * pull;
+    ++count;
+  }
+  // Without it the pulls scatter by some three. The quadrants by which the sharing is told are small beside the
+  // neighbourhoods that share, so that some of it is missed.
+  ASSERT_GT(count, 200U);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(count)), 1.15, 0.3);
+}
+
 TEST(Spots, TakeInHowWellAScanIsPlaced) {
   PointCloud cloud;
   add_side(cloud, 2, true, 1.0, [](double, double) { return 0.0; });
@@ -170,6 +204,55 @@ TEST(Tolerances, RefuseAFaceThatIsNotThere) {
   const auto report = inspect(all_sides(5.0), cube(), options, Context(1));
   ASSERT_FALSE(report.has_value());
   EXPECT_THAT(report.error().message, ::testing::HasSubstr("line 12"));
+}
+
+/// The cube with two triangles a CAD face, all but the last called by a name; two share one.
+const model::PreparedModel& named_cube() {
+  static const model::PreparedModel model = [] {
+    TriangleMesh mesh = test::joined(test::box({0, 0, 0}, {kEdge, kEdge, kEdge}));
+    for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) mesh.cad_faces.push_back(t / 2);
+    model::PreparedModel prepared = model::prepare(mesh, {}, Context(2)).value();
+    prepared.face_names = {{"bore A", ""}, {"rim", ""}, {"rim", ""}, {"<script>", ""}, {"foot", ""}};
+    return prepared;
+  }();
+  return model;
+}
+
+Result<DeviationReport> with_tolerances(std::string_view rows, const model::PreparedModel& model) {
+  InspectOptions options;
+  options.tolerances = tolerances_in(rows, "drawing.csv").value();
+  return inspect(all_sides(4.0), model, options, Context(1));
+}
+
+std::string refusal_of(std::string_view rows, const model::PreparedModel& model) {
+  const auto report = with_tolerances(rows, model);
+  return report ? "no error" : report.error().message;
+}
+
+TEST(Tolerances, HoldForTheFaceThatBearsTheName) {
+  const DeviationReport report = with_tolerances("bore A,-0.1,0.2\nface 4,-1,1\n", named_cube()).value();
+  ASSERT_EQ(report.faces.size(), 6U);
+  EXPECT_EQ(report.faces[0].name, "face 0 \"bore A\"");
+  EXPECT_EQ(report.faces[0].tolerance->high_mm, 0.2);
+  EXPECT_EQ(report.faces[4].name, "face 4 \"foot\"");
+  EXPECT_EQ(report.faces[4].tolerance->high_mm, 1.0);
+  EXPECT_FALSE(report.faces[3].tolerance.has_value());
+  EXPECT_EQ(report.faces[5].name, "face 5");
+  EXPECT_EQ(report.verdict, Verdict::pass);
+}
+
+TEST(Tolerances, OfANameThatNoFaceOrMoreThanOneBearsAreRefused) {
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  EXPECT_THAT(refusal_of("*,-1,1\nbore B,-1,1\n", named_cube()),
+              AllOf(HasSubstr("drawing.csv, line 2"), HasSubstr("'bore B'"), HasSubstr("face 0 \"bore A\""),
+                    HasSubstr("number")));
+  EXPECT_THAT(refusal_of("rim,-1,1\n", named_cube()),
+              AllOf(HasSubstr("drawing.csv, line 1"), HasSubstr("2 CAD faces are called 'rim'"),
+                    HasSubstr("face 1 \"rim\", face 2 \"rim\"")));
+  EXPECT_THAT(refusal_of("bore A,-1,1\n0,-2,2\n", named_cube()),
+              AllOf(HasSubstr("line 2"), HasSubstr("second tolerance")));
+  EXPECT_THAT(refusal_of("rim,-1,1\n", cube()), AllOf(HasSubstr("line 1"), HasSubstr("mesh"), HasSubstr("box")));
 }
 
 TEST(BestFit, TakesARigidMotionBackAndNeverAScale) {

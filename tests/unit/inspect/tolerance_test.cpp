@@ -38,13 +38,30 @@ TEST(ToleranceFile, ReadsTheSameFromJson) {
   EXPECT_EQ(table->rows[1].box->min(), Eigen::Vector3d(0, 0, 4));
 }
 
+TEST(ToleranceFile, NamesFacesAsTheCadDoes) {
+  const auto table = tolerances_in("bore A,-0.1,0.2\n\"Dichtfläche; außen\",-1,1\n", "t");
+  ASSERT_FALSE(table.has_value());  // semicolons part fields
+  const auto csv = tolerances_in("bore A,-0.1,0.2\n\"face of <b>\",-1,1\n", "t.csv").value();
+  EXPECT_EQ(csv.source, "t.csv");
+  EXPECT_EQ(csv.rows[0].face_name, "bore A");
+  EXPECT_FALSE(csv.rows[0].face.has_value());
+  EXPECT_EQ(csv.rows[1].face_name, "face of <b>");
+  const auto json = tolerances_in(R"([{"face": "Dichtfläche; \"außen\"", "low": -1, "high": 1},
+      {"face": "face 7", "low": -1, "high": 1}])",
+                                  "t")
+                        .value();
+  EXPECT_EQ(json.rows[0].face_name, "Dichtfläche; \"außen\"");
+  EXPECT_EQ(json.rows[1].face, 7);  // what reads as a number is one
+}
+
 TEST(ToleranceFile, NamesTheLineOfWhatIsWrong) {
   EXPECT_THAT(error_of("3,-1,1\n4,-1\n"), HasSubstr("line 2"));
   EXPECT_THAT(error_of("3,-1,1\n4,-1\n"), HasSubstr("found 2 fields"));
   EXPECT_THAT(error_of("3,-1,1\n\n4,-1,much\n"), HasSubstr("line 3"));
   EXPECT_THAT(error_of("3,1,-1\n"), HasSubstr("LOW <= HIGH"));
   EXPECT_THAT(error_of("3,-1,1\nface 3,-2,2\n"), HasSubstr("second tolerance"));
-  EXPECT_THAT(error_of("3,-1,1\nrim,-2,2\n"), HasSubstr("two corners"));
+  EXPECT_THAT(error_of("3,-1,1\n,-2,2\n"), HasSubstr("two corners"));
+  EXPECT_THAT(error_of("bore,-1,1\nbore,-2,2\n"), HasSubstr("line 2: 'bore' is given a second tolerance"));
   EXPECT_THAT(error_of("3,-1,nan\n"), HasSubstr("finite"));
   EXPECT_THAT(error_of("*,-1,1\n*,-1,1\n"), HasSubstr("line 2"));
   EXPECT_THAT(error_of("# nothing\n"), HasSubstr("holds no tolerance"));

@@ -7,8 +7,11 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <numbers>
+#include <regex>
 #include <set>
+#include <sstream>
 
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/readers.h"
@@ -114,6 +117,138 @@ TEST(Step, PartsOfAnAssemblyStandWhereItPlacesThemAndCountOnceEach) {
   EXPECT_EQ(model->cad_faces, 12u);
   EXPECT_NEAR(volume(model->mesh), 12000.0, 1e-6);
   EXPECT_TRUE(bounding_box(model->mesh).sizes().isApprox(Eigen::Vector3d(110, 20, 30), 1e-9));
+}
+
+/// A STEP file whose faces bear names, as a text: the first string of every ADVANCED_FACE, in the order of the file.
+std::string with_face_names(const std::string& step, const std::vector<std::string>& names) {
+  std::string result;
+  std::size_t from = 0, next = 0;
+  const std::string empty = "ADVANCED_FACE('',";
+  for (std::size_t at = step.find(empty); at != std::string::npos; at = step.find(empty, from)) {
+    const std::string& name = next < names.size() ? names[next++] : std::string();
+    result += step.substr(from, at - from) + "ADVANCED_FACE('" + name + "',";
+    from = at + empty.size();
+  }
+  return result + step.substr(from);
+}
+
+/// The planes on which the named faces of a STEP text lie, told from the text alone: a place and a direction by name.
+std::map<std::string, std::pair<Eigen::Vector3d, Eigen::Vector3d>> planes_by_name(std::string step) {
+  std::erase(step, '\n');
+  std::map<std::string, std::string> entities;
+  const std::regex entity("#(\\d+) ?= ?([A-Z0-9_]+\\([^;]*\\));");
+  for (std::sregex_iterator i(step.begin(), step.end(), entity), end; i != end; ++i) entities[(*i)[1]] = (*i)[2];
+  const auto referred = [&](const std::string& text) {
+    std::vector<std::string> found;
+    const std::regex reference("#(\\d+)");
+    for (std::sregex_iterator i(text.begin(), text.end(), reference), end; i != end; ++i) found.push_back((*i)[1]);
+    return found;
+  };
+  const auto vector_of = [&](const std::string& id) {
+    const std::string& text = entities.at(id);
+    std::string numbers = text.substr(text.rfind('(') + 1);
+    for (char& c : numbers) c = c == ',' || c == ')' ? ' ' : c;
+    std::istringstream stream(numbers);
+    Eigen::Vector3d v;
+    stream >> v.x() >> v.y() >> v.z();
+    return v;
+  };
+  std::map<std::string, std::pair<Eigen::Vector3d, Eigen::Vector3d>> planes;
+  for (const auto& [id, text] : entities) {
+    if (!text.starts_with("ADVANCED_FACE('")) continue;
+    const std::string name = text.substr(15, text.find("',") - 15);
+    const std::string plane = referred(text.substr(text.find("),"))).front();
+    const auto axes = referred(entities.at(referred(entities.at(plane)).front()));
+    planes[name] = {vector_of(axes[0]), vector_of(axes[1])};
+  }
+  return planes;
+}
+
+TEST(Step, FacesKeepTheNamesThatTheFileGivesThem) {
+  const TemporaryFolder folder;
+  const std::string plain = content_of(step_of(box(10, 20, 30), folder));
+  const std::vector<std::string> names{"bore A", "rim", "lid", "foot", "left", "right"};
+  const std::string named = with_face_names(plain, names);
+  const auto path = folder.file("named.step", named);
+  const auto model = read_model(path, Unit::stated);
+  ASSERT_TRUE(model) << model.error().message;
+  ASSERT_EQ(model->face_names.size(), 6u);
+  const auto planes = planes_by_name(named);
+  ASSERT_EQ(planes.size(), 6u);
+  for (std::size_t t = 0; t < model->mesh.triangles.size(); ++t) {
+    const CadFaceName& face = model->face_names[static_cast<std::size_t>(model->mesh.cad_faces[t])];
+    EXPECT_EQ(face.part, "");  // one part only
+    ASSERT_TRUE(planes.contains(face.name)) << face.name;
+    const auto& [place, direction] = planes.at(face.name);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d& corner = model->mesh.vertices[static_cast<std::size_t>(model->mesh.triangles[t][k])];
+      EXPECT_NEAR((corner - place).dot(direction), 0.0, 1e-9) << face.name;
+    }
+  }
+}
+
+TEST(Step, FileThatNamesNoFaceHasNoNames) {
+  const TemporaryFolder folder;
+  const auto path = step_of(box(10, 20, 30), folder);
+  EXPECT_TRUE(read_model(path, Unit::stated).value().face_names.empty());
+  const std::string none = with_face_names(content_of(path), {"NONE", "", " ", "none", "NONE", "NONE"});
+  EXPECT_TRUE(read_model(folder.file("none.step", none), Unit::stated).value().face_names.empty());
+}
+
+TEST(Step, HostileNamesOfFacesAreHarmless) {
+  const TemporaryFolder folder;
+  const std::string longest(3000, 'x');
+  const std::vector<std::string> names{
+      "it''s \"quoted\"", "<script>alert(1)</script>", R"(Dichtfl\X2\00E4\X0\che)", longest, "a,b;c)#1=(", "tab\there"};
+  const auto path = folder.file("hostile.step", with_face_names(content_of(step_of(box(1, 2, 3), folder)), names));
+  const auto model = read_model(path, Unit::stated);
+  ASSERT_TRUE(model) << model.error().message;
+  std::set<std::string> found;
+  for (const CadFaceName& face : model->face_names) found.insert(face.name);
+  EXPECT_TRUE(found.contains("it's \"quoted\""));
+  EXPECT_TRUE(found.contains("<script>alert(1)</script>"));
+  EXPECT_TRUE(found.contains("Dichtfläche"));
+  EXPECT_TRUE(found.contains(longest.substr(0, 500)));
+  EXPECT_TRUE(found.contains("a,b;c)#1=("));
+  EXPECT_EQ(found.size(), 6u);
+}
+
+TEST(Step, FacesOfAnAssemblyKnowTheirPart) {
+  gp_Trsf there;
+  there.SetTranslation(gp_Vec(100, 0, 0));
+  const TopoDS_Shape part = box(10, 20, 30);
+  TopoDS_Compound assembly;
+  BRep_Builder builder;
+  builder.MakeCompound(assembly);
+  builder.Add(assembly, part);
+  builder.Add(assembly, part.Moved(there));
+  builder.Add(assembly, BRepPrimAPI_MakeCylinder(3.0, 40.0).Shape());
+  const TemporaryFolder folder;
+  Interface_Static::SetIVal("write.step.assembly", 1);
+  const std::string step = content_of(step_of(assembly, folder));
+  Interface_Static::SetIVal("write.step.assembly", 0);
+  const std::regex product("PRODUCT\\('([^']*)', *'([^']*)'");
+  std::set<std::string> called;
+  std::string text = step;
+  std::erase(text, '\n');  // lines end within strings, too
+  for (std::sregex_iterator i(text.begin(), text.end(), product), end; i != end; ++i) called.insert((*i)[2]);
+  const auto model = read_model(folder.file("assembly.step", step), Unit::stated);
+  ASSERT_TRUE(model) << model.error().message;
+  ASSERT_EQ(model->face_names.size(), 15u);
+  std::map<std::string, std::set<int>> where;  // by the part's name: which of the two kinds of faces
+  for (std::size_t t = 0; t < model->mesh.triangles.size(); ++t) {
+    const CadFaceName& face = model->face_names[static_cast<std::size_t>(model->mesh.cad_faces[t])];
+    EXPECT_TRUE(called.contains(face.part)) << face.part;
+    double furthest = 0.0;  // the cylinder stands about the z axis, no face of a box lies within 3 mm of it all over
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d& corner = model->mesh.vertices[static_cast<std::size_t>(model->mesh.triangles[t][k])];
+      furthest = std::max(furthest, corner.head<2>().norm());
+    }
+    where[face.part].insert(furthest < 3.5 ? 1 : 0);
+  }
+  ASSERT_EQ(where.size(), 2u);
+  EXPECT_NE(where.begin()->second, std::next(where.begin())->second);
+  for (const auto& [name, kinds] : where) EXPECT_EQ(kinds.size(), 1u) << name;
 }
 
 TEST(Step, TessellationKeepsItsToleranceRelativeToTheSize) {

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -81,6 +83,51 @@ TEST_F(Watch, ForeignFilesAreToldOnceAndHiddenOnesNever) {
   write("notes.docx", "changed");
   write("z.ply");
   EXPECT_THAT(next(watch), testing::ElementsAre(FileEvent{Kind::ready, "z.ply"}));
+}
+
+TEST_F(Watch, WhatLiesUnderItsPathIsWatchedEvenIfThatIsAnotherFolderNow) {
+  fs::create_directories(folder_ / "first");
+  fs::create_directories(folder_ / "second");
+  fs::create_directory_symlink(folder_ / "first", folder_ / "link");
+  write("first/a.ply");
+  auto watch = FolderWatch::open(folder_ / "link", 20ms).value();
+  ASSERT_THAT(next(watch), testing::ElementsAre(FileEvent{Kind::ready, "a.ply"}));
+  fs::remove(folder_ / "link");
+  fs::create_directory_symlink(folder_ / "second", folder_ / "link");
+  EXPECT_THAT(next(watch), testing::ElementsAre(FileEvent{Kind::gone, "a.ply"}));
+  write("second/b.ply");
+  EXPECT_THAT(next(watch), testing::ElementsAre(FileEvent{Kind::ready, "b.ply"}));
+}
+
+// As a mounted disk leaves an empty folder of another disk behind when it is taken off.
+TEST_F(Watch, TheEmptyFolderThatADiskLeavesBehindIsNoDeletionOfItsFiles) {
+  const fs::path other = fs::path("/dev/shm") / ("asbuilt_watch_" + std::to_string(::getpid()));
+  std::error_code error;
+  struct stat here {
+  }, there{};
+  if (!fs::create_directories(other, error) || ::stat(folder_.c_str(), &here) != 0 ||
+      ::stat(other.c_str(), &there) != 0 || here.st_dev == there.st_dev) {
+    fs::remove_all(other, error);
+    GTEST_SKIP() << "/dev/shm is no disk of its own here";
+  }
+  fs::create_directories(folder_ / "disk");
+  write("disk/a.ply");
+  fs::create_directory_symlink(folder_ / "disk", folder_ / "link");
+  auto watch = FolderWatch::open(folder_ / "link", 20ms).value();
+  ASSERT_THAT(next(watch), testing::ElementsAre(FileEvent{Kind::ready, "a.ply"}));
+  fs::remove(folder_ / "link");
+  fs::create_directory_symlink(other, folder_ / "link");
+  EXPECT_THAT(watch.wait(300ms), testing::IsEmpty());
+  EXPECT_TRUE(watch.is_lost());
+  // The disk is back, with a file that came while it was away.
+  write("disk/b.ply");
+  fs::remove(folder_ / "link");
+  fs::create_directory_symlink(folder_ / "disk", folder_ / "link");
+  const auto events = next(watch);
+  EXPECT_FALSE(watch.is_lost());
+  EXPECT_THAT(events, testing::Contains(FileEvent{Kind::ready, "b.ply"}));
+  EXPECT_THAT(events, testing::Not(testing::Contains(FileEvent{Kind::gone, "a.ply"})));
+  fs::remove_all(other, error);
 }
 
 TEST_F(Watch, AMissingFolderIsAnErrorThatNamesIt) {

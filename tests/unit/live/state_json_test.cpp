@@ -99,10 +99,26 @@ TEST(Words, AScanWithoutThePartSaysWhatIsKnownAndNoMore) {
   state.scans[0].record.name = "scan_03";
   state.scans[0].record.status = io::ScanStatus::rejected;
   state.scans[0].record.reason_code = "no_hypothesis";
-  set_now(state, 0);
+  state.newest = 0;
+  set_now(state);
   EXPECT_EQ(state.now_level, "bad");
   EXPECT_NE(state.now_text.find("not found"), std::string::npos);
   EXPECT_EQ(state.now_text.find("should be in view"), std::string::npos);
+}
+
+TEST(Words, ATroubleComesBeforeAllElseUntilItIsOver) {
+  LiveState state;
+  set_now(state);
+  EXPECT_EQ(state.now_level, "act");
+  state.troubles["storing"] = {"The disk is full: a.ply waits.", "Make room."};
+  set_now(state);
+  EXPECT_EQ(state.now_level, "bad");
+  EXPECT_EQ(state.now_headline, "The disk is full: a.ply waits.");
+  EXPECT_EQ(state.now_text, "The disk is full: a.ply waits. Make room.");
+  state.troubles.clear();
+  set_now(state);
+  EXPECT_EQ(state.now_level, "act");
+  EXPECT_EQ(state.now_text, state.now_headline);
 }
 
 }  // namespace

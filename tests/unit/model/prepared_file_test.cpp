@@ -142,11 +142,32 @@ TEST_F(PreparedFile, IsRefusedWhenAnyByteOfItIsDamaged) {
   }
 }
 
+TEST_F(PreparedFile, KeepsTheNamesOfCadFaces) {
+  PreparedModel named = model_;
+  named.face_names = {{"bore A", ""}, {}, {"Dichtfläche <b>\"", "lid"}};
+  ASSERT_TRUE(save_prepared(path_, named));
+  EXPECT_EQ(load_prepared(path_, context_).value().face_names, named.face_names);
+}
+
+TEST_F(PreparedFile, OfTheVersionWithoutNamesIsStillRead) {
+  // Its body ended before the names, of which there are none here: eight bytes that count them.
+  constexpr std::size_t kHeader = 28, kDigest = 64, kCount = 8;
+  const std::string body = content_.substr(kHeader, content_.size() - kHeader - kDigest - kCount);
+  std::string header = content_.substr(0, kHeader);
+  header[16] = 3;
+  for (std::size_t i = 0; i < 8; ++i) header[20 + i] = static_cast<char>((body.size() >> (8 * i)) & 0xFF);
+  ASSERT_TRUE(io::write_file(path_, header + body + io::sha256(body)));
+  const auto loaded = load_prepared(path_, context_);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->skin.vertices, model_.skin.vertices);
+  EXPECT_TRUE(loaded->face_names.empty());
+}
+
 TEST_F(PreparedFile, OfANewerVersionSaysSo) {
   std::string newer = content_;
-  newer[16] = 4;
+  newer[16] = 5;
   const std::string message = message_for(newer);
-  EXPECT_THAT(message, HasSubstr("version 4"));
+  EXPECT_THAT(message, HasSubstr("version 5"));
   EXPECT_THAT(message, HasSubstr("newer"));
 }
 

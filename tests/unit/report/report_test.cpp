@@ -113,6 +113,21 @@ TEST(ReportJson, UsesTheRealMinusSignInSentences) {
   EXPECT_THAT(report["verdict"]["reason"].get<std::string>(), HasSubstr("\u22120.5"));
 }
 
+TEST(ReportJson, SaysHowManyFacesAPassLeavesUnjudged) {
+  // The top alone was seen, and less of the part is asked for: five sides of the cube nobody judged.
+  inspect::InspectOptions options;
+  options.tolerance = inspect::Tolerance{-2.0, 2.0};
+  options.minimum_coverage = 0.1;
+  const Inspected& measured = inspected();
+  const auto deviations =
+      inspect::inspect(inspect::Measurement{measured.cloud, measured.scan, measured.support}, cube(), options, Context(2))
+          .value();
+  ReportInput input{"reconstruct", {"reconstruct"}, measured.record, cube(), deviations, options};
+  const Json report = Json::parse(report_json(input));
+  EXPECT_EQ(report["verdict"]["part"], "pass");
+  EXPECT_THAT(report["verdict"]["reason"].get<std::string>(), HasSubstr("5 of 6 faces too little to be judged"));
+}
+
 TEST(Tables, HaveAsManyFieldsInEveryLineAsInTheHeader) {
   const ReportInput input = inspected().input();
   for (const std::string& text : {spots_csv(input), faces_csv(input), regions_csv(input), scans_csv(input)}) {

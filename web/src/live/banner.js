@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The one big line: what to do now. And below it, small: what the program does, and whether we still hear from it.
 import { h, svg } from '../shared/dom.js';
+import { typeset } from '../shared/format.js';
 
 const icons = {
   act: ['M4 12h15M13 5.5l6.5 6.5-6.5 6.5'], good: ['M4.5 12.8l5 5L19.5 7'], warn: ['M12 4.5v9.5M12 18.6v1'], bad: ['M6 6l12 12M18 6L6 18'], lost: ['M12 3a9 9 0 1 0 .01 0M5.8 5.8l12.4 12.4'],
@@ -44,8 +45,15 @@ export class Banner {
       this.text.textContent = this.heard ? `Connection lost. What you see is from ${clock(this.heard)}.` : 'No connection to the program.';
     } else if (now) {
       this.#level(now.level);
-      this.text.textContent = now.text;
+      this.#say(now);
     }
+  }
+
+  /** The headline large, what follows it smaller: a long sentence must not push the part out of sight. */
+  #say({ text, headline }) {
+    const first = headline && text.startsWith(headline) ? headline : text;
+    const rest = text.slice(first.length).trim();
+    this.text.replaceChildren(typeset(first), ...(rest ? [' ', h('span', { class: 'rest' }, typeset(rest))] : []));
   }
 
   #level(level) {

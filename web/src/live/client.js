@@ -91,6 +91,11 @@ export class Newest {
     this.fetch_newest = fetch_newest;
   }
 
+  /** What was reached says nothing any more: another program may answer, which counts anew. */
+  forget() {
+    this.reached = undefined;
+  }
+
   async want(number) {
     this.wanted = number;
     if (this.running) return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The column beside the part: how much is covered, whether all hangs together, where to stand next, where the holes are.
 import { h, make_button } from '../shared/dom.js';
-import { percent, number } from '../shared/format.js';
+import { percent, number, typeset } from '../shared/format.js';
 
 const share = (value, decimals = 0) => (typeof value === 'number' ? percent(value / 100, decimals) : '\u2013');
 export const letter_of = (i) => String.fromCharCode(65 + i);
@@ -42,14 +42,14 @@ export class Side {
     this.pieces.className = `pieces ${apart ? 'apart' : ''}`;
     this.pieces.hidden = pieces.length === 0;
     this.pieces.replaceChildren(h('p', { class: 'state' }, apart ? `In ${pieces.length} pieces` : pieces[0]?.scans.length > 1 ? `Joined: all ${pieces[0].scans.length} scans hang together` : 'One scan'),
-      ...pieces.filter((piece) => piece.join).map((piece) => h('p', null, piece.join.text)));
+      ...pieces.filter((piece) => piece.join).map((piece) => h('p', null, typeset(piece.join.text))));
   }
 
   #views(views) {
     this.views.hidden = views.length === 0;
     this.views.replaceChildren(h('h2', null, 'Where to stand next'), h('ol', null, views.map((view, i) => {
-      const item = h('li', { class: i === 0 ? 'first' : '' }, h('b', { class: 'letter' }, letter_of(i)), h('span', null, view.text,
-        (i === 0 || view.purpose === 'join') && h('small', null, `${number(view.distance)} mm away, ${percent(view.overlap, 0)} of it seen before${view.purpose === 'join' ? ', joins the pieces' : ''}`)));
+      const item = h('li', { class: i === 0 ? 'first' : '' }, h('b', { class: 'letter' }, letter_of(i)), h('span', null, typeset(view.text),
+        (i === 0 || view.purpose === 'join') && h('small', null, `${percent(view.overlap, 0)} of what it sees is known already${view.purpose === 'join' ? '; joins the pieces' : ''}`)));
       make_button(item, `Show place ${letter_of(i)}`, () => this.act.show_view(i));
       return item;
     })));
@@ -58,14 +58,14 @@ export class Side {
   #holes(holes) {
     this.holes.hidden = holes.length === 0;
     this.holes.replaceChildren(h('h2', null, 'Holes'), h('ul', null, holes.map((hole, i) => {
-      const item = h('li', { class: hole.reachable ? '' : 'unreachable' }, h('b', { class: 'n' }, share(hole.percent, 1)), h('span', null, hole.text, !hole.reachable && h('small', null, 'no position can see it')));
+      const item = h('li', { class: hole.reachable ? '' : 'unreachable' }, h('b', { class: 'n' }, share(hole.percent, 1)), h('span', null, typeset(hole.text), !hole.reachable && h('small', null, 'no position can see it')));
       make_button(item, `Show hole ${i + 1}`, () => this.act.show_hole(i));
       return item;
     })));
   }
 
   #notes({ notes, removed, duplicates }) {
-    const rows = notes.slice(-6).reverse().map((note) => h('li', { class: note.level }, note.text));
+    const rows = notes.slice(-6).reverse().map((note) => h('li', { class: note.level }, typeset(note.text)));
     const out = removed.map((file) => h('li', { class: 'out' }, `${file} was taken out. `, h('button', { type: 'button', onclick: () => this.act.restore(file) }, 'Bring it back')));
     const twice = duplicates.map(({ file, of }) => h('li', { class: 'info' }, `${file} is the same as ${of}.`));
     this.notes.hidden = rows.length + out.length + twice.length === 0;

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scans in order of arrival, newest last: a card each with status, gain and links. A press shows all about one.
 import { h } from '../shared/dom.js';
-import { number, percent, plural } from '../shared/format.js';
+import { number, percent, plural, typeset } from '../shared/format.js';
 import { verdict_icon } from '../shared/verdict.js';
 
 const looks = { accepted: 'pass', rejected: 'fail', failed: 'fail', dropped: 'fail', disconnected: 'not enough data', ambiguous: 'not enough data' };
 export const look_of = (scan) => looks[scan.status] ?? 'none';
 export const key_of = (scan) => `${scan.file}\n${scan.index_in_file}\n${scan.instance}`;
+/** What a card says of a scan that is not used: its sheet and the big line tell more. */
+const reasons = { no_hypothesis: 'part not found', low_score: 'part not found', poor_fit: 'part not found', normals_disagree: 'part not found', free_space_violated: 'part not found', contradicted: 'part not found',
+  weak_evidence: 'too little of the part', too_few_points: 'too little of the part', under_constrained: 'too little of the part', scan_too_small: 'scan too small', ambiguous_pose: 'two poses fit', second_instance: 'two parts in it',
+  contradicted_by_scans: 'others contradict it', unreadable: 'cannot be read' };
 const share = (value) => (typeof value === 'number' ? percent(value / 100, 1) : '');
 
 export class Strip {
@@ -55,7 +59,7 @@ export class Strip {
   /** Touches the page only where something changed: this runs for each scan at each state. */
   #fill(card, scan) {
     const links = scan.links.filter((link) => link.used).length;
-    const detail = scan.status === 'accepted' || scan.status === 'disconnected' ? `+${share(scan.new_percent)} · ${plural(links, 'link')}` : scan.reason_code.replaceAll('_', ' ');
+    const detail = scan.status === 'accepted' || scan.status === 'disconnected' ? `+${share(scan.new_percent)} · ${plural(links, 'link')}` : reasons[scan.reason_code] ?? scan.reason_code.replaceAll('_', ' ');
     const said = [scan.name, scan.status, detail, scan.provisional].join('\n');
     if (said === card.said) return;
     card.said = said;
@@ -82,7 +86,7 @@ export function scan_sheet(state, scan, { close, remove }) {
   } }, 'Take this scan out');
   return h('section', { class: `sheet verdict-${look_of(scan).replaceAll(' ', '-')}` },
     h('div', { class: 'sheet-head' }, verdict_icon(look_of(scan)), h('h2', null, scan.name), h('button', { type: 'button', class: 'close', 'aria-label': 'Close', onclick: close }, '×')),
-    h('p', { class: 'sentence' }, scan.sentence || scan.reason),
+    h('p', { class: 'sentence' }, typeset(scan.sentence || scan.reason)),
     pairs([['Status', scan.status + (scan.provisional ? ', provisional: judged from a thinned copy' : '')], ['New surface', share(scan.new_percent)], ['Sees of the part', share(scan.covers_percent)],
       ['Points on the part', `${number(scan.part_points)} of ${number(scan.points)}`], ['Score', typeof scan.score === 'number' ? number(scan.score, 2) : null], ['File', scan.file]]),
     links.length > 0 && [h('h3', null, 'Overlaps'), h('ul', null, links)], weak.length > 0 && [h('h3', null, 'Weakly held'), h('ul', null, weak)],

@@ -3,12 +3,13 @@
 import { Vector3 } from 'three';
 import { age_stops, category_colour, coverage_stops, deviation_stops, even_steps, lookup } from '../shared/colours.js';
 import { h } from '../shared/dom.js';
-import { number, signed_mm } from '../shared/format.js';
+import { number, signed_mm, typeset } from '../shared/format.js';
 import { scale_bar, swatches } from '../shared/legend.js';
 import { unpack } from '../shared/packed.js';
 import { Sensors } from '../shared/sensors.js';
 import { corner_at, read_surface, value_at } from '../shared/surface.js';
 import { Viewer } from '../shared/viewer.js';
+import { Axes } from './axes.js';
 import { key_of } from './strip.js';
 import { letter_of } from './side.js';
 
@@ -45,6 +46,7 @@ export class LiveView {
     this.viewer.orbit.wheel_active = true;
     this.viewer.canvas.addEventListener('blur', () => { this.viewer.orbit.wheel_active = true; });
     this.sensors = new Sensors(this.viewer, this.host, (id) => this.select(id));
+    this.host.after(new Axes(this.viewer).element);
     const count = this.surface.positions.length / 3;
     this.shown = new Float32Array(count);
     this.values = { support: new Uint16Array(count), deviation: new Float32Array(count).fill(NaN), newest: new Uint16Array(count).fill(kNone) };
@@ -118,7 +120,7 @@ export class LiveView {
     const colour = (scan) => apart && scan.component !== null ? category_colour(3 * scan.component) : [44, 84, 128];
     const sensors = state.scans.filter((scan) => scan.viewpoint && scan.component !== null).map((scan) => ({
       id: key_of(scan), position: scan.viewpoint, direction: scan.view_direction, colour: colour(scan), label: number_in(scan), title: scan.name, kind: key_of(scan) === this.chosen ? 'chosen' : '' }));
-    const ghosts = state.views.map((view, i) => ({ id: `view ${i}`, position: view.position, direction: view.direction, target: view.target, colour: i === 0 ? [0, 140, 90] : [110, 175, 145], label: letter_of(i), title: view.text, ghost: true, kind: 'ghost' }));
+    const ghosts = state.views.map((view, i) => ({ id: `view ${i}`, position: view.position, direction: view.direction, target: view.target, colour: i === 0 ? [0, 140, 90] : [110, 175, 145], label: letter_of(i), title: typeset(view.text), ghost: true, kind: 'ghost' }));
     const links = state.links.filter((link) => link.used).map((link) => ({ from: key_of(state.scans[link.a]), to: key_of(state.scans[link.b]), overlap: link.overlap, colour: firmness[link.firmness] ?? firmness.weak }));
     this.sensors.set([...sensors, ...ghosts], links);
     this.viewer.others = this.sensors.places();

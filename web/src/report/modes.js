@@ -3,7 +3,7 @@
 import {
   category_colour, coverage_stops, deviation_steps, deviation_stops, even_steps, kNotScanned, lookup, uncertainty_stops,
 } from '../shared/colours.js';
-import { decimals_for, number, signed_mm } from '../shared/format.js';
+import { number } from '../shared/format.js';
 import { scale_bar, swatches } from '../shared/legend.js';
 import { verdict_colours } from '../shared/verdict.js';
 
@@ -12,6 +12,7 @@ const not_scanned = (name = 'not scanned') => ({ name, rgb: kHatch[0], other: kH
 const kWithin = [222, 227, 232];
 const kOver = [196, 62, 46];
 const kUnder = [36, 98, 172];
+const kFacesInLegend = 7;
 const kChosen = [255, 193, 7];
 
 /** The tolerance that the whole part has, for legend and histogram. */
@@ -100,15 +101,13 @@ function scan_mode(report, scene) {
 }
 
 function region_mode(report, scene) {
-  const decimals = decimals_for(report.over_area?.sigma);
   const values = scene.region.map((region, v) => (!Number.isNaN(region) ? region + 1 : Number.isNaN(scene.deviation[v]) ? NaN : 0));
   const has_tolerance = tolerance_of(report) !== null || report.verdict?.tolerance_given;
   return category_mode({
     id: 'regions', label: has_tolerance ? 'Out of tolerance' : 'Conspicuous', values,
     note: has_tolerance ? 'connected regions beyond the tolerance' : 'regions that deviate far more than their noise',
     colours: (chosen) => [kWithin, ...report.regions.map((region, i) => (chosen?.region === i ? kChosen : region.peak > 0 ? kOver : kUnder))],
-    legend: () => [{ name: 'too high', rgb: kOver }, { name: 'too low', rgb: kUnder }, { name: has_tolerance ? 'within' : 'others', rgb: kWithin },
-      ...(report.regions.length ? [{ name: `largest peak ${signed_mm(report.regions.reduce((a, b) => (Math.abs(b.peak) > Math.abs(a) ? b.peak : a), 0), decimals)}`, rgb: [255, 255, 255] }] : [])].slice(0, 3),
+    legend: () => [{ name: 'too high', rgb: kOver }, { name: 'too low', rgb: kUnder }, { name: has_tolerance ? 'within' : 'others', rgb: kWithin }],
   });
 }
 
@@ -119,8 +118,16 @@ function face_mode(report, scene) {
   return category_mode({
     id: 'faces', label: judged ? 'Face verdicts' : 'Faces', note: judged ? 'verdict of each CAD face' : 'faces of the model', values,
     colours: (chosen) => report.faces.map((face, i) => (chosen?.face === i ? kChosen : judged ? verdict_colours[face.verdict] ?? kWithin : category_colour(i))),
-    legend: () => (judged ? ['pass', 'fail', 'not enough data'].map((name) => ({ name: `${name} (${number(verdicts.filter((verdict) => verdict === name).length)})`, rgb: verdict_colours[name] })) : []),
+    legend: () => (judged ? ['pass', 'fail', 'not enough data'].map((name) => ({ name: `${name} (${number(verdicts.filter((verdict) => verdict === name).length)})`, rgb: verdict_colours[name] })) : largest_faces(report)),
   });
+}
+
+/** The largest faces by name: no legend holds all faces of a part, and colours come back after a while. */
+function largest_faces(report) {
+  const faces = report.faces.map((face, i) => ({ ...face, i })).filter((face) => face.spots_scanned).sort((a, b) => b.area - a.area || a.i - b.i);
+  const entries = faces.slice(0, kFacesInLegend).map(({ name, i }) => ({ name, rgb: category_colour(i) }));
+  const left = faces.length - entries.length;
+  return left > 0 ? [...entries, { name: `and ${number(left)} smaller`, rgb: [255, 255, 255] }] : entries;
 }
 
 /** All modes that this report has data for. */

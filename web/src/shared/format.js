@@ -55,5 +55,8 @@ export const place = (point, decimals = 1) =>
 
 export const plural = (count, one, many = `${one}s`) => `${number(count)}${'\u00a0'}${count === 1 ? one : many}`;
 
+/** A sentence of the program as print wants it: a true minus before axes and numbers, units beside their numbers. */
+export const typeset = (text) => (text ?? '').replace(/(^|[\s(,])-(?=[xyz\d])/g, `$1${kMinus}`).replace(/(\d) (?=(mm|cm\u00b2|%)(?![a-z]))/g, '$1\u00a0');
+
 /** The last part of a path, whatever the system it was written on. */
 export const file_name = (path) => (path ? path.split(/[\\/]/).pop() : kNone);

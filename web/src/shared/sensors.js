@@ -100,7 +100,7 @@ export class Sensors {
         this.labels.set(sensor.id, label);
       }
       const kind = `sensor ${sensor.kind ?? ''}`;
-      if (label.className !== kind) label.className = kind;
+      if (label.kind !== kind) label.className = label.kind = kind;
       if (label.textContent !== sensor.label) label.textContent = sensor.label;
       if (label.title !== sensor.title) label.title = sensor.title ?? '';
       label.style.setProperty('--colour', css_colour(sensor.colour));
@@ -109,11 +109,18 @@ export class Sensors {
 
   #place_labels() {
     if (!this.shown || !this.group.visible) return;
-    for (const sensor of this.shown) {
+    const middle = new Vector3(...this.viewer.surface.box.centre);
+    const towards_us = this.viewer.camera.position.clone().sub(middle);
+    // All places are asked for before the first label moves: the browser lays the page out anew for each question after a change.
+    const places = this.shown.map((sensor) => this.viewer.project(sensor.at.toArray()));
+    this.shown.forEach((sensor, i) => {
       const label = this.labels.get(sensor.id);
-      const at = this.viewer.project(sensor.at.toArray());
-      label.hidden = !at;
+      const at = places[i];
+      if (label.hidden !== !at) label.hidden = !at;
+      // A label has no depth: what stands beyond the part is faint, and under what stands before it.
+      const is_beyond = sensor.at.clone().sub(middle).dot(towards_us) < 0;
+      if (label.classList.contains('beyond') !== is_beyond) label.classList.toggle('beyond', is_beyond);
       if (at) label.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, -50%)`;
-    }
+    });
   }
 }

@@ -47,7 +47,7 @@ test('a session is followed: the line, coverage, scans and proposals', { timeout
     assert.ok(share >= before_share);
     before_share = share;
   }
-  assert.match(await now(tab), /^Next: stand 260 mm/);
+  assert.match(await now(tab), /^Next: stand 260\smm/);
   assert.equal(await tab.$$eval('.sensor.ghost', (list) => list.length), 3);
   assert.equal(await tab.$$eval('.sensor:not(.ghost)', (list) => list.length), 4);
   assert.match(await tab.textContent('.pieces'), /Joined/);
@@ -110,6 +110,20 @@ test('unscanned surface is orange stripes from the start', { timeout: kPatience 
   await close();
 });
 
+test('the axes of the words are shown, as the view turns them', { timeout: kPatience }, async () => {
+  const { tab, close } = await opened();
+  const places = () => tab.evaluate(() => { window.asbuilt.view.viewer.draw(); return Object.fromEntries([...document.querySelectorAll('.axes text')].map((text) => [text.textContent, [Number(text.getAttribute('x')), Number(text.getAttribute('y'))]])); });
+  const look_from = (x, y, z) => tab.evaluate((from) => { const { viewer } = window.asbuilt.view; viewer.orbit.look_along({ x: from[0], y: from[1], z: from[2], length: () => Math.hypot(...from) }); }, [x, y, z]);
+  await look_from(0, -1, 0);
+  let at = await places();
+  assert.equal(Object.keys(at).length, 6);
+  assert.ok(at['+x'][0] > 30 && at['\u2212x'][0] < -30 && at['+z'][1] < -30 && Math.abs(at['+z'][0]) < 1, JSON.stringify(at));
+  await look_from(1, 0, 0);
+  at = await places();
+  assert.ok(at['+y'][0] > 30 && at['\u2212y'][0] < -30, JSON.stringify(at));
+  await close();
+});
+
 test('a rejected scan is told by line, colour and frame', { timeout: kPatience }, async () => {
   const { tab, close } = await opened();
   show(2);
@@ -117,7 +131,8 @@ test('a rejected scan is told by line, colour and frame', { timeout: kPatience }
   server.set(with_rejected_last(example_state(mesh, 3)));
   await tab.waitForSelector('.banner[data-level=bad]');
   await tab.waitForSelector('#page.flash-rejected');
-  assert.match(await now(tab), /scan_02 was not used: the part is not in it/);
+  assert.match(await now(tab), /^scan_02 was not used: the part is not in it\. Scan this side again\.$/);
+  assert.equal(await tab.textContent('#now .rest'), 'Scan this side again.');
   assert.equal(await tab.$$eval('.strip [data-status=rejected]', (list) => list.length), 1);
   await close();
 });
@@ -142,10 +157,14 @@ test('a program that starts anew counts from one again and is believed', { timeo
   const { tab, close } = await opened();
   show(5, { revision: 400 });
   await revision_is(tab, 400);
+  await values_are(tab, 5);
+  const asked = () => server.requests.filter((request) => request === 'GET /surface/values').length;
+  const before = asked();
   await server.stop();
-  show(5, { revision: 2 });
+  show(5, { revision: 2 });  // its values have the number of the old ones by chance
   await server.start();
   await revision_is(tab, 2);
+  while (asked() === before) await new Promise((resolve) => setTimeout(resolve, 20));
   await close();
 });
 
@@ -165,6 +184,15 @@ test('a scan is taken out after a second press, and brought back', { timeout: kP
   await tab.setInputFiles('.tools input', { name: 'scan 07.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\n') });
   while (server.posted.length < 4) await new Promise((resolve) => setImmediate(resolve));
   assert.deepEqual(server.posted.sort(), ['DELETE /scans/scan_01.ply', 'POST /result', 'POST /scans scan 07.ply', 'POST /scans/scan_01.ply/restore']);
+  await close();
+});
+
+test('trouble that somebody must deal with is told beside the notes, too', { timeout: kPatience }, async () => {
+  const { tab, close } = await opened();
+  show(2);
+  await revision_is(tab, 3);
+  show(2, { revision: 4, notes: [{ revision: 4, level: 'bad', file: 'scan_07.ply', text: 'scan_07.ply could not be stored and waits: no room' }] });
+  await tab.waitForSelector('.toast:has-text("scan_07.ply could not be stored")');
   await close();
 });
 

@@ -62,5 +62,5 @@ export function with_rejected_last(state, text = 'the part is not in it') {
   const last = state.scans.length - 1;
   const scans = state.scans.map((scan, i) => (i !== last ? scan : { ...scan, status: 'rejected', provisional: false, reason_code: 'low_score', reason: text, sentence: `${scan.name}: rejected, ${text}.`, component: null, viewpoint: null, view_direction: null, links: [], new_percent: null, model_from_scan: null }));
   return { ...state, scans, links: state.links.filter((link) => link.a !== last && link.b !== last), pieces: state.pieces.map((piece) => ({ ...piece, scans: piece.scans.filter((i) => i !== last) })),
-    now: { level: 'bad', text: `${scans[last].name} was not used: ${text}. Scan this side again.`, sound: 'rejected' } };
+    now: { level: 'bad', headline: `${scans[last].name} was not used: ${text}.`, text: `${scans[last].name} was not used: ${text}. Scan this side again.`, sound: 'rejected' } };
 }

@@ -22,6 +22,17 @@ test('of many wanted revisions only the running and the last are fetched, one at
   assert.deepEqual(fetched, [1, 50]);
 });
 
+test('after a connection was lost the same number is fetched again', async () => {
+  const fetched = [];
+  const newest = new Newest(async (revision) => fetched.push(revision));
+  await newest.want(3);
+  await newest.want(3);
+  assert.deepEqual(fetched, [3]);
+  newest.forget();
+  await newest.want(3);
+  assert.deepEqual(fetched, [3, 3]);
+});
+
 test('a failed request is tried again', async () => {
   let calls = 0;
   const newest = new Newest(async () => { if (++calls < 3) throw new Error('no network'); });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { decimals_for, file_name, kNone, mm, number, percent, plural, short, signed } from '../../src/shared/format.js';
+import { decimals_for, file_name, kNone, mm, number, percent, plural, short, signed, typeset } from '../../src/shared/format.js';
 
 test('minus is the true sign, thousands are set apart, and a rounded zero has no sign', () => {
   assert.equal(number(-1234567.891, 2), '\u22121\u202f234\u202f567.89');
@@ -22,6 +22,12 @@ test('nearly all is not said to be all, nearly nothing not nothing', () => {
   assert.equal(percent(0.99999), '99.9\u202f%');
   assert.equal(percent(0), '0.0\u202f%');
   assert.equal(percent(0.0001), '<\u202f0.1\u202f%');
+});
+
+test('a sentence keeps minus and unit beside what they belong to, and names as they are', () => {
+  assert.equal(typeset('from between +y and -x, 787 mm away: 8.7 % new'), 'from between +y and \u2212x, 787\u00a0mm away: 8.7\u00a0% new');
+  assert.equal(typeset('near (12, -80, 30) of scan-xy_07.ply, 3 mmx'), 'near (12, \u221280, 30) of scan-xy_07.ply, 3 mmx');
+  assert.equal(typeset(undefined), '');
 });
 
 test('decimals show two digits of the spread', () => {
