@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 
 #include "asbuilt/refine/symmetry_choice.h"
 #include "asbuilt/refine/view_difference.h"
@@ -32,6 +33,17 @@ std::string names_of(const std::vector<int>& views, const RefinedComponent& comp
   return names;
 }
 
+// Where scans may slide along one another by as much as a dent is deep, dents that are the same lie in different
+// places, and nothing can be read from what differs.
+bool are_held(const RefinedComponent& component, double diameter_mm) {
+  constexpr double kMostSlide = 0.003;  // of the diameter, 1 sigma
+  return std::ranges::none_of(component.refinement.view_holds, [&](const refine::ViewHold& hold) {
+    return std::ranges::any_of(hold.loose, [&](const refine::LooseMotion& loose) {
+      return loose.unheld || loose.sigma_mm > kMostSlide * diameter_mm;
+    });
+  });
+}
+
 void leave_out(const PosedScan& scan, std::size_t placements, io::RunRecord& record, const Context& context) {
   io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
   entry.status = io::ScanStatus::ambiguous;
@@ -43,22 +55,20 @@ void leave_out(const PosedScan& scan, std::size_t placements, io::RunRecord& rec
   context.warn(fmt::format("{}: ambiguous: {}", entry.path, entry.reason));
 }
 
-void say_that_nothing_tells(const RefinedComponent& component, std::size_t placements, std::vector<PosedScan>& scans,
-                            io::RunRecord& record, const Context& context) {
+// `why` ends the sentence that no scan tells the placements apart.
+void say_that_nothing_tells(const RefinedComponent& component, std::size_t placements, std::string_view why,
+                            std::vector<PosedScan>& scans, io::RunRecord& record, const Context& context) {
   for (std::size_t v = 0; v < component.members.size(); ++v) {
     const PosedScan& scan = scan_of(static_cast<int>(v), component, scans);
     io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
     if (!entry.reason_code.empty()) continue;
     entry.reason_code = "symmetry";
-    entry.reason = fmt::format(
-        "the part has {} placements that its CAD does not tell apart, and to within the noise the scans are alike in "
-        "all of them",
-        placements);
+    entry.reason = fmt::format("the part has {} placements that its CAD does not tell apart, and {}", placements, why);
   }
   context.warn(fmt::format(
-      "the part has {} placements that its CAD does not tell apart, and no scan shows what was built differently: "
-      "which way round each scan belongs is not known",
-      placements));
+      "the part has {} placements that its CAD does not tell apart, and {}: which way round each scan belongs "
+      "is not known",
+      placements, why));
 }
 
 }  // namespace
@@ -67,11 +77,18 @@ Result<bool> choose_placements(const RefinedComponent& component, std::vector<Po
                                const LoadedModel& model, io::RunRecord& record, const Context& context) {
   const model::SymmetryGroup& symmetry = model.prepared.symmetry;
   if (symmetry.kind != model::SymmetryGroup::Kind::discrete || component.members.size() < 2) return false;
+  if (!are_held(component, model.prepared.diameter)) {
+    say_that_nothing_tells(component, symmetry.elements.size(),
+                           "the scans hold one another too loosely to tell what was built differently", scans, record,
+                           context);
+    return false;
+  }
   const refine::ComparedViews views(views_of(component.members, scans), model.prepared.diameter, context);
   ASBUILT_TRY(choice, refine::choose_elements(views, refined_poses(component, scans), component.links,
                                               symmetry.elements, context));
   if (std::ranges::count(choice.decided, 1) == 1) {
-    say_that_nothing_tells(component, symmetry.elements.size(), scans, record, context);
+    say_that_nothing_tells(component, symmetry.elements.size(),
+                           "to within the noise the scans are alike in all of them", scans, record, context);
     return false;
   }
   bool changed = false;

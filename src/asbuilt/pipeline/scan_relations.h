@@ -14,8 +14,9 @@ namespace asbuilt::pipeline {
 /// For a part with a finite symmetry group: gives each scan of a refined component the placement that what was built
 /// tells (refine::choose_elements); detected and starting poses change with it. Scans for which nothing tells are taken
 /// out of `scans` and become ambiguous (`symmetry`) in the record. If nothing tells for any scan, all placements show
-/// one surface to within the noise: the scans stay as they are and the record says so (`symmetry`, accepted).
-/// Gives whether poses or scans have changed, so that all must be linked and refined anew. Errors: cancelled.
+/// one surface to within the noise: the scans stay as they are and the record says so (`symmetry`, accepted); likewise
+/// if they may slide along one another by more than 0.3 % of the diameter. Gives whether poses or scans have changed,
+/// so that all must be linked and refined anew. Errors: cancelled.
 [[nodiscard]] Result<bool> choose_placements(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                              const LoadedModel& model, io::RunRecord& record, const Context& context);
 
