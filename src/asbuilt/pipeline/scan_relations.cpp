@@ -115,7 +115,13 @@ Result<bool> choose_placements(const RefinedComponent& component, std::vector<Po
 
 Result<bool> separate_individuals(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                   const LoadedModel& model, const io::RunRecord& record, const Context& context) {
-  if (component.members.size() < 4) return false;
+  if (component.members.size() < 4 || !are_held(component, model.prepared.diameter)) return false;
+  // Of a symmetric part whose placements nobody knows, one face may be held against another.
+  const bool is_placed = std::ranges::none_of(component.members, [&](int member) {
+    const PosedScan& scan = scans[static_cast<std::size_t>(member)];
+    return record.scans[static_cast<std::size_t>(scan.index)].reason_code == "symmetry";
+  });
+  if (!is_placed) return false;
   const refine::ComparedViews views(views_of(component.members, scans), model.prepared.diameter, context);
   ASBUILT_TRY(found, refine::two_individuals(views, refined_poses(component, scans), component.links, context));
   if (!found) return false;

@@ -21,8 +21,9 @@ namespace asbuilt::pipeline {
                                              const LoadedModel& model, io::RunRecord& record, const Context& context);
 
 /// Looks for two individuals among the scans of a refined component (refine::two_individuals). The scans of the smaller
-/// one get another PosedScan::individual, so that nothing links them to the others any more.
-/// Gives whether two were found. Errors: cancelled.
+/// one get another PosedScan::individual, so that nothing links them to the others any more. Where scans may slide
+/// along one another by more than 0.3 % of the diameter, or a symmetric part's placements are not known, nothing is
+/// told apart. Gives whether two were found. Errors: cancelled.
 [[nodiscard]] Result<bool> separate_individuals(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                                 const LoadedModel& model, const io::RunRecord& record,
                                                 const Context& context);
