@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,6 +11,7 @@
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/ply_writer.h"
 #include "asbuilt/pipeline.h"
+#include "asbuilt/simulate/parts.h"
 #include "asbuilt/simulate/simulate.h"
 #include "support/parts.h"
 
@@ -118,6 +120,38 @@ TEST_F(Reconstruct, ASecondPlacementInAScanIsAmbiguousUnlessAllAreWanted) {
     }
   }
   for (const auto& [path, count] : claims) EXPECT_EQ(points_of_file[path].size(), count) << path;
+}
+
+// Two castings of one CAD that were warped differently, their scans in one pile: what is given back is one of them.
+TEST_F(Reconstruct, OfTwoCastingsGivesBackOne) {
+  for (const std::uint64_t casting : {1U, 2U}) {
+    simulate::SimulateOptions options{.scans = 5, .seed = 2 + casting, .as_built = {}};
+    options.points = 60000;
+    options.as_built.warp_ratio = 0.006;
+    const auto simulation = simulate::simulate(simulate::valve_body(), options, Context(2));
+    ASSERT_TRUE(simulation.has_value()) << simulation.error().message;
+    const fs::path folder = base_ / ("casting_" + std::to_string(casting));
+    ASSERT_TRUE(simulate::write_simulation(folder, *simulation).has_value());
+    fs::create_directories(scenes());
+    fs::copy_file(folder / "model.ply", scenes() / "model.ply", fs::copy_options::overwrite_existing);
+    for (const auto& scan : simulation->scans) {
+      scans_.push_back((scenes() / fmt::format("casting_{}_{}.ply", casting, scan.name)).string());
+      fs::copy_file(folder / (scan.name + ".ply"), scans_.back());
+    }
+  }
+  const auto record = reconstruct();
+  ASSERT_TRUE(record.has_value()) << record.error().message;
+  std::map<std::string, int> accepted;  // by casting
+  for (const io::ScanRecord& scan : record->scans) {
+    if (scan.status == io::ScanStatus::accepted) {
+      ++accepted[scan.name.substr(0, 9)];
+    } else if (scan.status == io::ScanStatus::disconnected) {
+      EXPECT_EQ(scan.reason_code, "other_individual") << scan.name;
+      EXPECT_NE(scan.reason.find("casting_"), std::string::npos) << "names the scans that belong together";
+    }
+  }
+  ASSERT_EQ(accepted.size(), 1U) << "the castings are mixed";
+  EXPECT_GE(accepted.begin()->second, 3);
 }
 
 TEST_F(Reconstruct, StopsWhenAskedAndGoesOnToTheSameBytes) {
