@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <netinet/in.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
 #include <condition_variable>
-#include <csignal>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "live_scenes.h"
@@ -190,15 +189,10 @@ TEST_F(LiveServer, WhatCannotBeStoredIsToldAndStoredByItselfOnceItCan) {
   simulate_scenes(1, 46);
   start();
   fs::copy_file(base_ / "scenes" / names_[0], base_ / "coming");
-  ::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
-  rlimit small = before;
-  small.rlim_cur = 4096;
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::optional<test::FullDisk> full(std::in_place);
   fs::rename(base_ / "coming", watched() / names_[0]);
   const Json waiting = until([](const Json& now) { return now["now"]["level"] == "bad"; });
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  full.reset();
   EXPECT_THAT(waiting["now"]["headline"].get<std::string>(), testing::HasSubstr(names_[0] + " waits"));
   EXPECT_TRUE(waiting["scans"].empty());
   const Json stored = until([](const Json& now) { return now["scans"].size() == 1 && now["now"]["level"] != "bad"; });

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
-#include <sys/resource.h>
 
-#include <csignal>
+#include <optional>
 #include <set>
 
 #include "asbuilt/live/session.h"
@@ -119,14 +118,9 @@ TEST_F(LiveSessionTest, AFullDiskIsToldAndTheSessionLives) {
   simulate_scenes(1, 26);
   auto session = open();
   const std::string path = put(names_[0]);
-  ::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
-  rlimit small = before;
-  small.rlim_cur = 4096;
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::optional<test::FullDisk> full(std::in_place);
   const auto refused = session->add(path);
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  full.reset();
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::unwritable_output);
   EXPECT_TRUE(session->state()->scans.empty());

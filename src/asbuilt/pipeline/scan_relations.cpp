@@ -143,8 +143,7 @@ Result<bool> separate_individuals(const RefinedComponent& component, std::vector
     scan.individual = ++next;
     scan.individual_reason = fmt::format(
         "of one of two individuals, and it does not show of which: it meets the others only where both are alike; "
-        "these "
-        "belong together: {}; and these: {}",
+        "these belong together: {}; and these: {}",
         names_of(found->first, component, scans, record), names_of(found->second, component, scans, record));
   }
   return true;

@@ -10,7 +10,6 @@ namespace asbuilt::refine {
 namespace {
 
 constexpr int kAllPairsUpTo = 16;
-constexpr double kDecisive = 15.0;  // log-likelihood: a patch six standard deviations off, or several weaker ones
 
 // Index of the element that is elements[b]^-1 * elements[a].
 std::vector<std::vector<std::size_t>> quotients(std::span<const Pose> elements) {
@@ -140,7 +139,7 @@ class Choice {
       std::vector<int> other = chosen;
       other[v] = e;
       improve(other, {v, reference});
-      if (total(other) - at_best <= std::max(kDecisive, own)) return false;
+      if (total(other) - at_best <= std::max(kDecisiveEvidence, own)) return false;
       if (met < kFewestShared * static_cast<double>(shared(v, other))) return false;
     }
     return true;

@@ -60,7 +60,6 @@ ViewDifference& ViewDifference::operator+=(const ViewDifference& other) {
 
 ComparedViews::ComparedViews(std::span<const View> views, double diameter_mm, const Context& context)
     : views_(views.size()), diameter_mm_(diameter_mm) {
-  for (const View& view : views) points_.push_back(view.segment_in_scan.size());
   parallel_for(context, views.size(), 1, [&](std::size_t v) {
     views_[v] =
         sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, {kPoints, kProbes, true, false}, context);
@@ -74,8 +73,6 @@ ComparedViews::ComparedViews(std::span<const View> views, double diameter_mm, co
 ComparedViews::~ComparedViews() = default;
 
 int ComparedViews::count() const { return static_cast<int>(views_.size()); }
-
-std::size_t ComparedViews::points(int view) const { return points_[static_cast<std::size_t>(view)]; }
 
 template <class Use>
 void ComparedViews::for_each_pair(const SampledView& from, const SampledView& to, const Pose& to_from_from,
@@ -182,7 +179,6 @@ using Table = std::vector<std::vector<ViewDifference>>;  // between views, by pl
 using Sides = std::vector<char>;                         // 0 or 1, one a view
 
 constexpr double kUsualShare = 0.05;  // of the patches of two individuals that differ
-constexpr double kDecisive = 15.0;    // log-likelihood
 
 ViewDifference across(const Table& between, const Sides& sides, bool same) {
   ViewDifference sum;
@@ -293,7 +289,7 @@ std::vector<char> decided(const Table& between, const Sides& sides) {
     other[view] = static_cast<char>(1 - other[view]);
     const std::array<std::size_t, 2> kept = {reference, view};
     improve(between, other, kUsualShare, kept);
-    known[view] = most - score(between, other, kUsualShare) >= kDecisive ? 1 : 0;
+    known[view] = most - score(between, other, kUsualShare) >= kDecisiveEvidence ? 1 : 0;
   }
   return known;
 }

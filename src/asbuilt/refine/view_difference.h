@@ -27,6 +27,10 @@ struct ViewDifference {
   }
 };
 
+/// Log-likelihood by which one reading of what views show must lead over any other to be believed: a patch six standard
+/// deviations off, or several weaker ones.
+inline constexpr double kDecisiveEvidence = 15.0;
+
 struct SampledView;
 
 /// Views made ready to be compared under many relative poses. A single point says little: its noise is that of the
@@ -41,7 +45,6 @@ class ComparedViews {
   ComparedViews& operator=(const ComparedViews&) = delete;
 
   [[nodiscard]] int count() const;
-  [[nodiscard]] std::size_t points(int view) const;  ///< of the view's segment
   [[nodiscard]] ViewDifference difference(int a, int b, const Pose& b_from_a) const;
 
   /// The pair fitted to one another from close by (point to plane, Tukey, a few steps; what the pair does not hold
@@ -58,7 +61,6 @@ class ComparedViews {
   [[nodiscard]] ViewDifference one_way(const SampledView& from, const SampledView& to, const Pose& to_from_from) const;
 
   std::vector<SampledView> views_;
-  std::vector<std::size_t> points_;
   double diameter_mm_;
 };
 

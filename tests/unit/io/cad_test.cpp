@@ -101,7 +101,8 @@ TEST(Step, UnitsThatTheFileStatesAreHonouredAndOverridden) {
   EXPECT_THAT(overridden->notes, Contains(HasSubstr("as you said")));
 }
 
-TEST(Step, PartsOfAnAssemblyStandWhereItPlacesThemAndCountOnceEach) {
+// One part in two places, 100 mm apart.
+TopoDS_Compound two_boxes() {
   gp_Trsf there;
   there.SetTranslation(gp_Vec(100, 0, 0));
   const TopoDS_Shape part = box(10, 20, 30);
@@ -110,6 +111,11 @@ TEST(Step, PartsOfAnAssemblyStandWhereItPlacesThemAndCountOnceEach) {
   builder.MakeCompound(assembly);
   builder.Add(assembly, part);
   builder.Add(assembly, part.Moved(there));
+  return assembly;
+}
+
+TEST(Step, PartsOfAnAssemblyStandWhereItPlacesThemAndCountOnceEach) {
+  const TopoDS_Compound assembly = two_boxes();
   const TemporaryFolder folder;
   const auto model = read_model(step_of(assembly, folder), Unit::stated);
   ASSERT_TRUE(model) << model.error().message;
@@ -214,15 +220,8 @@ TEST(Step, HostileNamesOfFacesAreHarmless) {
 }
 
 TEST(Step, FacesOfAnAssemblyKnowTheirPart) {
-  gp_Trsf there;
-  there.SetTranslation(gp_Vec(100, 0, 0));
-  const TopoDS_Shape part = box(10, 20, 30);
-  TopoDS_Compound assembly;
-  BRep_Builder builder;
-  builder.MakeCompound(assembly);
-  builder.Add(assembly, part);
-  builder.Add(assembly, part.Moved(there));
-  builder.Add(assembly, BRepPrimAPI_MakeCylinder(3.0, 40.0).Shape());
+  TopoDS_Compound assembly = two_boxes();
+  BRep_Builder().Add(assembly, BRepPrimAPI_MakeCylinder(3.0, 40.0).Shape());
   const TemporaryFolder folder;
   Interface_Static::SetIVal("write.step.assembly", 1);
   const std::string step = content_of(step_of(assembly, folder));

@@ -8,7 +8,7 @@
 
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/verify.h"
-#include "unit/verify/seen.h"
+#include "unit/verify/asked.h"
 
 namespace asbuilt::verify {
 namespace {
@@ -60,27 +60,12 @@ TEST(SizeHold, OfASphereIsThatOfItsRadiusAsFarAsItIsSeen) {
 }
 
 /// A box in a scan, looked at from its corner, asked as a box of `believed` edges whose corner lies there.
-struct Believed {
+struct Believed : test::Asked {
   Believed(const Eigen::Vector3d& built, const Eigen::Vector3d& believed, const std::vector<TriangleMesh>& others)
-      : model(test::prepared(simulate::box(believed))) {
-    std::vector<TriangleMesh> all = others;
-    const Pose there = test::corner_ahead(500);
-    all.push_back(simulate::transformed(simulate::box(built), there));
-    scan = test::seen(all, 0.25);
-    const double distance_mm = 0.5 * scan.spacing_mm + 0.005 * model.diameter;
-    options = {distance_mm, std::max(distance_mm, 2.5 * scan.spacing_mm)};
-    seen = std::make_unique<ScanEvidence>(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
-    model_from_scan = (there * Eigen::Translation3d(0.5 * (built - believed))).inverse();
-    evidence = evidence_for(model_from_scan, model.dense_samples, model, *seen, options);
-  }
-  [[nodiscard]] double lead() const { return size_lead(model_from_scan, evidence, model, *seen, options); }
-
-  model::PreparedModel model;
-  Pose model_from_scan;
-  scan::Scan scan;
-  EvidenceOptions options;
-  std::unique_ptr<ScanEvidence> seen;
-  PoseEvidence evidence;
+      : test::Asked(test::prepared(simulate::box(believed)),
+                    (test::corner_ahead(500) * Eigen::Translation3d(0.5 * (built - believed))).inverse(),
+                    test::with(others, simulate::box(built), test::corner_ahead(500)), 0.25) {}
+  [[nodiscard]] double lead() const { return size_lead(model_from_scan, evidence, model, *seen_by, options); }
 };
 
 TEST(SizeLead, TellsABoxFromLargerAndSmallerOnesWhereItsEdgesAreSeen) {

@@ -10,36 +10,24 @@
 #include "asbuilt/verify/near_poses.h"
 #include "asbuilt/verify/verdict.h"
 #include "asbuilt/verify/verify.h"
-#include "unit/verify/seen.h"
+#include "unit/verify/asked.h"
 
 namespace asbuilt::verify {
 namespace {
 
 /// A part in a scan, asked at its true pose.
-struct Asked {
-  Asked(const TriangleMesh& mesh, const Pose& scan_from_model, std::vector<TriangleMesh> others, double half_width)
-      : model(test::prepared(mesh)), model_from_scan(scan_from_model.inverse()) {
-    others.push_back(simulate::transformed(mesh, scan_from_model));
-    scan = test::seen(others, half_width);
-    const double distance_mm = 0.5 * scan.spacing_mm + 0.005 * model.diameter;
-    options = {distance_mm, std::max(distance_mm, 2.5 * scan.spacing_mm)};
-    seen = std::make_unique<ScanEvidence>(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
-    evidence = evidence_for(model_from_scan, model.dense_samples, model, *seen, options);
-  }
+struct Asked : test::Asked {
+  Asked(const TriangleMesh& mesh, const Pose& scan_from_model, const std::vector<TriangleMesh>& others,
+        double half_width)
+      : test::Asked(test::prepared(mesh), scan_from_model.inverse(), test::with(others, mesh, scan_from_model),
+                    half_width) {}
   [[nodiscard]] double lead(double min_held = VerifyOptions().min_weakest_direction) const {
     return slip(min_held).lead_over_it;
   }
   [[nodiscard]] Slip slip(double min_held) const {
-    return strongest_slip(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, *seen, options);
+    return strongest_slip(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, *seen_by, options);
   }
   [[nodiscard]] double weakest() const { return weakest_direction(evidence, model, false); }
-
-  model::PreparedModel model;
-  Pose model_from_scan;
-  scan::Scan scan;
-  EvidenceOptions options;
-  std::unique_ptr<ScanEvidence> seen;
-  PoseEvidence evidence;
 };
 
 const Eigen::Vector3d kBrick(100, 80, 60);
@@ -88,8 +76,8 @@ TEST(Slip, AFaceSlipsAlongTheAxesOfItsBoxOrTurnsInItself) {
   turned.rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
   const Asked slab(simulate::box({400, 300, 40}), turned, {}, 0.25);
   int along_x = 0, along_y = 0, turns = 0;
-  for (const Pose& pose : slipped_poses(slab.model_from_scan, slab.evidence, slab.model,
-                                        kLimits.min_weakest_direction, 4.0, Slips::single)) {
+  for (const Pose& pose : slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction,
+                                        4.0, Slips::single)) {
     const Pose motion = pose * slab.model_from_scan.inverse();
     const Eigen::AngleAxisd turn(motion.linear());
     const Eigen::Vector3d shift = motion * slab.model.box.center().eval() - slab.model.box.center();
@@ -139,9 +127,10 @@ TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
   const Asked seen(beam(300), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
   for (const double drift_mm : {-25.0, -3.0, 2.0, 12.0, 20.0}) {
     const Pose drifted = Eigen::Translation3d(drift_mm, 0, 0) * seen.model_from_scan;
-    const PoseEvidence evidence = evidence_for(drifted, seen.model.dense_samples, seen.model, *seen.seen, seen.options);
-    const Pose settled =
-        settled_between_edges(drifted, evidence, seen.model, kLimits.min_weakest_direction, *seen.seen, seen.options);
+    const PoseEvidence evidence =
+        evidence_for(drifted, seen.model.dense_samples, seen.model, *seen.seen_by, seen.options);
+    const Pose settled = settled_between_edges(drifted, evidence, seen.model, kLimits.min_weakest_direction,
+                                               *seen.seen_by, seen.options);
     EXPECT_LT(displacement_mm(settled, seen.model_from_scan, seen.model), 0.01 * seen.model.diameter) << drift_mm;
   }
 }
@@ -149,7 +138,7 @@ TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
 TEST(Slip, WhatTheSurfaceHoldsIsNotMovedByItsEdges) {
   const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
   const Pose settled = settled_between_edges(brick.model_from_scan, brick.evidence, brick.model,
-                                             kLimits.min_weakest_direction, *brick.seen, brick.options);
+                                             kLimits.min_weakest_direction, *brick.seen_by, brick.options);
   EXPECT_TRUE(settled.isApprox(brick.model_from_scan));
 }
 

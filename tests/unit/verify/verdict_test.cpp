@@ -165,8 +165,7 @@ TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
   EXPECT_TRUE(is_beyond_doubt(judged([](Candidate&) {}), {}));
   const std::vector<std::function<void(Candidate&)>> flaws{
       [](Candidate& c) { c.contradiction_share = 0.02; }, [](Candidate& c) { c.overrun_share = 0.1; },
-      [](Candidate& c) { c.weakest_direction = 0.004; },
-      [](Candidate& c) { c.size_hold = 0.0, c.size_lead = 20.0; },
+      [](Candidate& c) { c.weakest_direction = 0.004; }, [](Candidate& c) { c.size_hold = 0.0, c.size_lead = 20.0; },
       [](Candidate& c) { c.residual_ratio = 0.3, c.normal_agreement = 0.8; }};
   for (const auto& spoil : flaws) {
     const Detection detection = judged(spoil);
