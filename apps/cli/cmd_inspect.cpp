@@ -17,10 +17,22 @@ struct Arguments {
 
 std::string summary(const inspect::DeviationReport& report, const std::string& folder) {
   const auto& area = report.over_area;
-  std::string text = fmt::format(
-      "{} points, {:.0f} % of the surface scanned\n"
-      "deviation over the scanned surface: mean {:+.4g} mm, sigma {:.4g} mm, rms {:.4g} mm, 95 % within {:.4g} mm\n",
-      report.deviation_mm.size(), 100.0 * report.coverage, area.mean, area.sigma, area.rms, area.p95);
+  const std::size_t points = report.deviation_mm.size();
+  std::string text = fmt::format("{} points, {:.0f} % of the surface scanned\n", points, 100.0 * report.coverage);
+  if (2 * report.far_points > points) {
+    text += fmt::format(
+        "{} of the points lie too far from the part to count: is the cloud in the model's frame, and is --scan-unit "
+        "its unit?\n",
+        report.far_points == points ? "all" : fmt::format("{:.0f} %", 100.0 * static_cast<double>(report.far_points) /
+                                                                          static_cast<double>(points)));
+  }
+  if (area.count > 0) {
+    text += fmt::format(
+        "deviation over the scanned surface: mean {:+.4g} mm, sigma {:.4g} mm, rms {:.4g} mm, 95 % within {:.4g} mm\n",
+        area.mean, area.sigma, area.rms, area.p95);
+  } else if (report.verdict) {
+    text += fmt::format("tolerance: {}\n", inspect::name_of(*report.verdict));
+  }
   if (area.in_tolerance) {
     text += fmt::format("tolerance: {}, {:.2f} % within, {:.2f} % over, {:.2f} % under\n",
                         inspect::name_of(report.verdict.value_or(inspect::Verdict::not_scanned)),

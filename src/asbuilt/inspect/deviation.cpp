@@ -330,8 +330,10 @@ class Inspection {
       return judged ? report_.tolerance_at(report_.face_of_spot[spot], model_.dense_samples.positions[spot])
                     : &report_.region_limits;
     };
-    report_.regions = regions_out_of(model_.dense_samples, report_.spots, report_.face_of_spot, tolerance_of,
-                                     *report_.finder, options);
+    FoundRegions found = regions_out_of(model_.dense_samples, report_.spots, report_.face_of_spot, tolerance_of,
+                                        *report_.finder, options);
+    report_.regions = std::move(found.largest);
+    report_.regions_found = found.count;
     // Fitted over a plane; the surface may be bent.
     for (Region& region : report_.regions) region.peak.point = model_.surface->nearest(region.peak.point).point;
     report_.region_of_spot.assign(report_.spots.size(), -1);

@@ -52,10 +52,10 @@ std::uint32_t most_frequent(const std::vector<std::uint32_t>& spots, std::span<c
 
 }  // namespace
 
-std::vector<Region> regions_out_of(const PointCloud& places, std::span<const Spot> spots,
-                                   std::span<const std::uint32_t> face_of_spot,
-                                   const std::function<const Tolerance*(std::uint32_t)>& tolerance_of,
-                                   const SpotFinder& finder, const RegionOptions& options) {
+FoundRegions regions_out_of(const PointCloud& places, std::span<const Spot> spots,
+                            std::span<const std::uint32_t> face_of_spot,
+                            const std::function<const Tolerance*(std::uint32_t)>& tolerance_of,
+                            const SpotFinder& finder, const RegionOptions& options) {
   std::vector<Outlier> outliers;
   for (std::uint32_t i = 0; i < spots.size(); ++i) {
     const Tolerance* tolerance = tolerance_of(i);
@@ -64,10 +64,11 @@ std::vector<Region> regions_out_of(const PointCloud& places, std::span<const Spo
     if (deviation > tolerance->high_mm) outliers.push_back({i, 1, tolerance->high_mm});
     if (deviation < tolerance->low_mm) outliers.push_back({i, -1, tolerance->low_mm});
   }
-  std::vector<Region> regions;
-  if (outliers.empty()) return regions;
+  FoundRegions found;
+  if (outliers.empty()) return found;
   for (const std::vector<int>& members : connected(outliers, places, kNeighbourSpacings * options.spacing_mm)) {
-    if (members.size() < kLeastSpots || regions.size() == options.most) break;  // by decreasing size
+    if (members.size() < kLeastSpots) break;  // by decreasing size
+    if (++found.count > options.most) continue;
     Region region;
     const Outlier* peak = nullptr;
     double beyond = -1.0;
@@ -96,9 +97,9 @@ std::vector<Region> regions_out_of(const PointCloud& places, std::span<const Spo
     const double excess = peak->side * (region.peak.deviation_mm - region.limit_mm);
     const double error = region.peak.standard_error_mm;
     region.significant = std::isfinite(error) && excess > options.significance * error;
-    regions.push_back(std::move(region));
+    found.largest.push_back(std::move(region));
   }
-  return regions;
+  return found;
 }
 
 }  // namespace asbuilt::inspect

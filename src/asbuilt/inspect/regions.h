@@ -33,10 +33,15 @@ struct RegionOptions {
   double significance = 3.0;                     ///< standard errors
 };
 
+struct FoundRegions {
+  std::vector<Region> largest;  ///< at most RegionOptions::most
+  std::size_t count = 0;        ///< all that there are
+};
+
 /// Connected spots out of tolerance: neighbours within 1.6 spacings whose normals differ by less than 60 degrees and
 /// that deviate to the same side. Single and paired spots are left out. Largest area first, ties by the first spot.
 /// `tolerance_of(spot)` is what holds there, or nothing; `face_of_spot` has an entry a spot.
-[[nodiscard]] std::vector<Region> regions_out_of(const PointCloud& places, std::span<const Spot> spots,
+[[nodiscard]] FoundRegions regions_out_of(const PointCloud& places, std::span<const Spot> spots,
                                                  std::span<const std::uint32_t> face_of_spot,
                                                  const std::function<const Tolerance*(std::uint32_t)>& tolerance_of,
                                                  const SpotFinder& finder, const RegionOptions& options);

@@ -86,6 +86,7 @@ struct SpotFinder::Implementation : Witnesses {
   [[nodiscard]] Spot at(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, const Reaches& reaches,
                         Scratch& scratch) const {
     std::vector<Near>& near = scratch.near;
+    if (!(spacing > 0.0)) return {};  // no two places were measured
     double reach = std::max(reaches.own_mm, 1.5 * spacing);
     gather(position, normal, reach, near);
     while (near.size() < kAround && 2.0 * reach < 8.0 * radius) {

@@ -92,7 +92,8 @@ void Witnesses::gather(const Eigen::Vector3f& position, const Eigen::Vector3f& n
   });
 }
 
-/// Median distance of a point to its nearest neighbour, without a tree over all of them.
+/// Median distance of a point to its nearest neighbour at another place (merged files hold points twice), without a tree
+/// over all of them; 0 if there is but one place.
 double Witnesses::median_distance(double diameter) const {
   constexpr std::size_t kProbes = 1000;
   std::vector<double> distances;
@@ -103,7 +104,8 @@ double Witnesses::median_distance(double diameter) const {
     for (double reach = 0.25 * radius; reach < diameter; reach *= 4.0) {
       cubes->around(witnesses[place].foot, static_cast<float>(reach), [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-          if (i != place) squared = std::min(squared, (witnesses[i].foot - witnesses[place].foot).squaredNorm());
+          const float here = (witnesses[i].foot - witnesses[place].foot).squaredNorm();
+          if (here > 0.0F) squared = std::min(squared, here);
         }
       });
       if (static_cast<double>(squared) <= reach * reach) break;  // what lies beyond is further

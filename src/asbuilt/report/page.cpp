@@ -93,10 +93,12 @@ std::string head_of(const ReportInput& input) {
       escaped(std::filesystem::path(input.record.model.path).filename().string()), verdict, verdict,
       escaped(summary_of(input)));
   html += figure(percent(deviations.coverage), "of the surface scanned");
-  html += figure(signed_mm(area.mean) + " mm", "mean, over area");
-  html += figure(unsigned_mm(area.sigma), "standard deviation, over area");
-  html += figure(unsigned_mm(area.p95), "95 % are within");
-  html += figure(signed_mm(area.min) + " \u2026 " + signed_mm(area.max) + " mm", "smallest, largest");
+  if (area.count > 0) {
+    html += figure(signed_mm(area.mean) + " mm", "mean, over area");
+    html += figure(unsigned_mm(area.sigma), "standard deviation, over area");
+    html += figure(unsigned_mm(area.p95), "95 % are within");
+    html += figure(signed_mm(area.min) + " \u2026 " + signed_mm(area.max) + " mm", "smallest, largest");
+  }
   if (area.in_tolerance) html += figure(percent(area.in_tolerance), "of what was scanned in tolerance");
   return html + "</div>\n";
 }
@@ -170,7 +172,9 @@ std::string faces_table(const ReportInput& input) {
 std::string regions_table(const ReportInput& input) {
   std::string html =
       fmt::format("<h2>{}</h2>\n", input.options.has_tolerance() ? "Out of tolerance" : "What stands out");
-  if (input.deviations.regions.empty()) return html + "<p>No connected region.</p>\n";
+  const std::size_t shown = input.deviations.regions.size(), found = input.deviations.regions_found;
+  if (shown == 0) return html + "<p>No connected region.</p>\n";
+  if (found > shown) html += fmt::format("<p>The {} largest of {} regions.</p>\n", shown, found);
   html +=
       "<div class=\"scroll\"><table><tr><th>region<th class=\"n\">area, mm\u00b2<th class=\"n\">peak, mm<th "
       "class=\"n\">standard error<th>at, mm<th>face<th>significant</tr>\n";

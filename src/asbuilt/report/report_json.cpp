@@ -178,6 +178,7 @@ std::string report_json(const ReportInput& input) {
                     {"faces", faces_json(input.deviations, input.model.face_names)},
                     {"boxes", boxes_json(input.deviations)},
                     {"regions", regions_json(input.deviations)},
+                    {"regions_found", input.deviations.regions_found},
                     {"scans", scans_json(input)},
                     {"graph", graph_json(input.record)},
                     {"refinement", refinement_json(input.record)},

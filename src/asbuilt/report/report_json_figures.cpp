@@ -33,19 +33,20 @@ Json tolerance_json(const std::optional<inspect::Tolerance>& tolerance) {
 }
 
 Json statistics_json(const inspect::DeviationStatistics& s) {
+  const auto known = [&](double value) { return s.count > 0 ? json_number(value) : Json(nullptr); };
   return {{"count", s.count},
-          {"min", json_number(s.min)},
-          {"max", json_number(s.max)},
-          {"mean", json_number(s.mean)},
-          {"mean_absolute", json_number(s.mean_absolute)},
-          {"rms", json_number(s.rms)},
-          {"sigma", json_number(s.sigma)},
+          {"min", known(s.min)},
+          {"max", known(s.max)},
+          {"mean", known(s.mean)},
+          {"mean_absolute", known(s.mean_absolute)},
+          {"rms", known(s.rms)},
+          {"sigma", known(s.sigma)},
           {"sigma_without_noise", optional_number(s.sigma_without_noise)},
-          {"mean_positive", json_number(s.mean_positive)},
-          {"mean_negative", json_number(s.mean_negative)},
-          {"median", json_number(s.median)},
-          {"p95", json_number(s.p95)},
-          {"p99", json_number(s.p99)},
+          {"mean_positive", known(s.mean_positive)},
+          {"mean_negative", known(s.mean_negative)},
+          {"median", known(s.median)},
+          {"p95", known(s.p95)},
+          {"p99", known(s.p99)},
           {"in_tolerance", optional_number(s.in_tolerance)},
           {"over_tolerance", optional_number(s.over_tolerance)},
           {"under_tolerance", optional_number(s.under_tolerance)}};

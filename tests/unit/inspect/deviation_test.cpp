@@ -102,6 +102,31 @@ TEST(Inspect, OfNoPointsSaysThatNothingWasScanned) {
   EXPECT_EQ(report.verdict.value(), Verdict::not_scanned);
 }
 
+TEST(Inspect, OfASinglePlaceSaysThatNothingWasScanned) {
+  const auto at = [](const Eigen::Vector3f& place, std::size_t times) {
+    PointCloud cloud;
+    cloud.positions.assign(times, place);
+    return cloud;
+  };
+  for (const PointCloud& cloud :
+       {at({50.0F, 50.0F, 100.1F}, 1), at({50.0F, 50.0F, 100.1F}, 100), at({5e4F, 5e4F, 5e4F}, 100)}) {
+    const DeviationReport report = inspected(cloud);
+    EXPECT_EQ(report.coverage, 0.0);
+    for (const Spot& spot : report.finder->detailed_at(cube().dense_samples, Context(2))) EXPECT_EQ(spot.points, 0U);
+  }
+}
+
+TEST(Inspect, OfPointsThatAreThereTwiceSaysTheSame) {
+  const PointCloud once = over_top(1.0, [](double x, double) { return 0.01 * x; });
+  PointCloud twice = once;
+  twice.positions.insert(twice.positions.end(), once.positions.begin(), once.positions.end());
+  twice.normals.insert(twice.normals.end(), once.normals.begin(), once.normals.end());
+  const DeviationReport single = inspected(once), doubled = inspected(twice);
+  EXPECT_EQ(doubled.spacing_mm, single.spacing_mm);
+  EXPECT_NEAR(doubled.coverage, single.coverage, 0.01);  // the eight nearest are four places
+  EXPECT_NEAR(doubled.over_area.mean, single.over_area.mean, 1e-3);
+}
+
 TEST(Inspect, HasNoVerdictWithoutATolerance) {
   EXPECT_FALSE(inspected(over_top(5.0, [](double, double) { return 0.0; })).verdict.has_value());
 }

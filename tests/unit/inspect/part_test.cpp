@@ -173,6 +173,15 @@ TEST(Regions, MeasureADentWithoutLevellingIt) {
   EXPECT_EQ(report.verdict, Verdict::fail);
 }
 
+TEST(Regions, AreCountedWhereNotAllAreGiven) {
+  PointCloud cloud;
+  const auto in_pad = [](double x) { return std::fmod(x, 12.5) > 3.0 && std::fmod(x, 12.5) < 9.5; };
+  add_side(cloud, 2, true, 0.5, [&](double a, double b) { return in_pad(a) && in_pad(b) ? 1.0 : 0.0; });
+  const DeviationReport report = inspect(cloud, cube(), {.tolerance = Tolerance{-0.5, 0.5}}, Context(2)).value();
+  EXPECT_EQ(report.regions_found, 64U);  // eight rows of eight pads
+  EXPECT_EQ(report.regions.size(), RegionOptions{}.most);
+}
+
 TEST(Regions, AreNotInventedInNoise) {
   const DeviationReport report =
       inspect(all_sides(1.0, 0.2), cube(), {.tolerance = Tolerance{-0.4, 0.4}}, Context(2)).value();

@@ -31,11 +31,11 @@ function figures(report, area, coverage, decimals) {
   const accepted = (report.scans ?? []).filter((scan) => scan.status === 'accepted').length;
   const list = [];
   if (typeof area?.in_tolerance === 'number') list.push(figure(percent(area.in_tolerance), 'within tolerance', 'of the scanned area'));
-  list.push(figure(percent(coverage?.share), 'scanned', `${number(coverage?.support_mean, 1)} scans a spot on average`));
+  list.push(figure(percent(coverage?.share), 'scanned', coverage?.support_mean > 0 ? `${number(coverage.support_mean, 1)} scans a spot on average` : null));
   list.push(figure(signed_mm(area?.mean, decimals), 'mean deviation', 'over the area'));
   list.push(figure(mm(area?.sigma, decimals), 'standard deviation', typeof area?.sigma_without_noise === 'number' ? `${mm(area.sigma_without_noise, decimals)} without noise` : null));
   list.push(figure(mm(area?.p95, decimals), '95 % stay below', 'absolute deviation'));
-  list.push(figure(signed_mm(worst(area, report.regions), decimals), 'largest deviation', plural(report.regions?.length ?? 0, 'region', 'regions') + (report.verdict.tolerance_given ? ' out of tolerance' : ' stand out')));
+  list.push(figure(signed_mm(worst(area, report.regions), decimals), 'largest deviation', plural(report.regions_found ?? report.regions?.length ?? 0, 'region', 'regions') + (report.verdict.tolerance_given ? ' out of tolerance' : ' stand out')));
   if (report.scans?.length) list.push(figure(`${accepted} of ${report.scans.length}`, 'scans used', scans_detail(report)));
   return list;
 }

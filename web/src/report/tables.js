@@ -68,7 +68,10 @@ export function regions_table(report, go) {
     { title: 'face', of: (region) => region.face_name ?? kNone },
     { title: 'more than noise', of: (region) => (region.significant === null || region.significant === undefined ? kNone : region.significant ? 'yes' : 'no') },
   ];
-  return shortened(columns, report.regions, { on_row: go && ((row, region) => make_button(row, `Show region ${region.index + 1}`, () => go({ region: region.index }))) });
+  const found = report.regions_found ?? report.regions.length;
+  const note = found > report.regions.length && h('p', { class: 'soft' }, `The ${number(report.regions.length)} largest of ${number(found)}.`);
+  const rows = shortened(columns, report.regions, { on_row: go && ((row, region) => make_button(row, `Show region ${region.index + 1}`, () => go({ region: region.index }))) });
+  return [note, rows];
 }
 
 const status_class = (status) => (status === 'accepted' ? 'pass' : ['rejected', 'failed', 'dropped'].includes(status) ? 'fail' : 'not enough data');

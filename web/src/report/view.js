@@ -35,12 +35,18 @@ export class ReportView {
 
   /** Makes the view; call when the element is in the page, so that it has a size. Throws without WebGL. */
   start() {
-    this.viewer = new Viewer(this.host);
+    this.viewer = new Viewer(this.host, { covered_right: () => this.#covered_by_legend() });
     this.viewer.set_surface(this.scene, { open: this.report.model.open_edges > 0 });
     this.viewer.picked = (hit) => this.show_pick(hit);
     this.viewer.after_frame.push(() => this.#place_marker());
     this.set_mode(this.modes[0].id);
     this.show_pick(null);
+  }
+
+  /** px at the right of the view that the legend lies over; on a phone it stands below. */
+  #covered_by_legend() {
+    const legend = this.legend.getBoundingClientRect(), host = this.host.getBoundingClientRect();
+    return legend.bottom > host.top && legend.top < host.bottom ? Math.max(0, host.right - legend.left) : 0;
   }
 
   set_mode(id) {

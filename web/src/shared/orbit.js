@@ -5,9 +5,9 @@ import { MathUtils, Vector3 } from 'three';
 const kPole = Math.PI / 2 - 1e-4;
 
 export class Orbit {
-  /** `surface`: the element that takes the input. `radius`: of what is looked at, in mm. */
+  /** `surface`: the element that takes the input. `radius`: of what is looked at, in mm. `free_aspect`: width / height of what is free. */
   constructor(camera, surface, changed) {
-    Object.assign(this, { camera, surface, changed, target: new Vector3(), azimuth: -0.9, elevation: 0.5, distance: 100, radius: 50 });
+    Object.assign(this, { camera, surface, changed, target: new Vector3(), azimuth: -0.9, elevation: 0.5, distance: 100, radius: 50, free_aspect: 1 });
     this.pointers = new Map();
     this.wheel_active = false;
     const listen = (name, handler, options) => surface.addEventListener(name, handler.bind(this), options);
@@ -44,7 +44,7 @@ export class Orbit {
   /** The distance from the target at which a sphere fills the view. */
   fitting_distance(radius) {
     const half = MathUtils.degToRad(this.camera.fov) / 2;
-    const narrow = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
+    const narrow = Math.min(half, Math.atan(Math.tan(half) * this.free_aspect));
     return (1.04 * radius) / Math.sin(narrow);
   }
 
@@ -57,7 +57,7 @@ export class Orbit {
     const offset = new Vector3();
     return points.reduce((most, point) => {
       offset.subVectors(point, target);
-      const aside = Math.max(Math.abs(offset.dot(right)) / (tangent * this.camera.aspect), Math.abs(offset.dot(up)) / tangent);
+      const aside = Math.max(Math.abs(offset.dot(right)) / (tangent * this.free_aspect), Math.abs(offset.dot(up)) / tangent);
       return Math.max(most, offset.dot(out) + 1.1 * aside);
     }, 0);
   }

@@ -18,8 +18,10 @@ const kRest = 180;      // ms without motion after which all is drawn again
 const calm = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 export class Viewer {
-  /** Draws into a canvas that fills `host`; throws if the browser has no WebGL 2. */
-  constructor(host, { antialias = true, most_pixels_per_px = 2, background = 0xf1f4f7 } = {}) {
+  /** Draws into a canvas that fills `host`; throws if the browser has no WebGL 2. `covered_right` tells how many px at the
+   * right of it something else lies over. */
+  constructor(host, { antialias = true, most_pixels_per_px = 2, background = 0xf1f4f7, covered_right = () => 0 } = {}) {
+    this.covered_right = covered_right;
     this.background = background;
     this.host = host;
     this.canvas = document.createElement('canvas');
@@ -188,7 +190,7 @@ export class Viewer {
   }
 
   #clicked_centre() {
-    if (this.surface) this.picked?.(this.pick_at(this.canvas.clientWidth / 2, this.canvas.clientHeight / 2));
+    if (this.surface) this.picked?.(this.pick_at(...this.project(this.orbit.target.toArray())));
   }
 
   /** A picture of the part alone, parallel projection, on white: a PNG as data URL. */
@@ -233,12 +235,15 @@ export class Viewer {
   #resize() {
     const { clientWidth: width, clientHeight: height } = this.host;
     if (!width || !height) return;
-    const was = this.camera.aspect;
+    const was = this.orbit.free_aspect;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    // The target comes to stand in the middle of what nothing covers.
+    const covered = Math.min(this.covered_right(), width / 2);
+    this.camera.setViewOffset(width, height, covered / 2, 0, width, height);
+    this.orbit.free_aspect = (width - covered) / height;
     // A part that filled the view still does when the window gets narrower.
-    if (this.surface && was > this.camera.aspect) this.orbit.distance *= Math.min(2, was / this.camera.aspect);
+    if (this.surface && was > this.orbit.free_aspect) this.orbit.distance *= Math.min(2, was / this.orbit.free_aspect);
     this.request();
   }
 }
