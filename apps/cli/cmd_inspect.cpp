@@ -23,8 +23,9 @@ std::string summary(const inspect::DeviationReport& report, const std::string& f
     text += fmt::format(
         "{} of the points lie too far from the part to count: is the cloud in the model's frame, and is --scan-unit "
         "its unit?\n",
-        report.far_points == points ? "all" : fmt::format("{:.0f} %", 100.0 * static_cast<double>(report.far_points) /
-                                                                          static_cast<double>(points)));
+        report.far_points == points
+            ? "all"
+            : fmt::format("{:.0f} %", 100.0 * static_cast<double>(report.far_points) / static_cast<double>(points)));
   }
   if (area.count > 0) {
     text += fmt::format(

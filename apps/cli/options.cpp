@@ -83,7 +83,9 @@ void add_choices_about_scans(CLI::App& command, pipeline::Options& options) {
 }
 
 void add_joint_options(CLI::App& command, pipeline::Options& options) {
-  command.add_flag("--mesh", options.mesh, "Also write mesh.ply, a surface mesh");
+  command.add_flag("--mesh", options.mesh, "Also write mesh.ply, a surface mesh, open where nothing was scanned");
+  command.add_flag("--watertight", options.watertight,
+                   "Also write mesh_watertight.ply: the CAD's skin moved onto what was scanned, the rest filled in");
   command
       .add_option_function<std::string>(
           "--gauge",

@@ -7,11 +7,11 @@ scans="scene/scan_00.ply scene/scan_01.ply scene/scan_02.ply"
 # ---- the same bytes whatever the thread count
 for threads in 1 2 3; do
   # shellcheck disable=SC2086
-  expect 0 reconstruct "$model" $scans -o "r$threads" --threads $threads --mesh --json
+  expect 0 reconstruct "$model" $scans -o "r$threads" --threads $threads --mesh --watertight --json
   cp stdout "stdout$threads"
   same "stdout$threads" "r$threads/result.json"
 done
-for file in result.json reconstruction.ply mesh.ply report.json report.html; do
+for file in result.json reconstruction.ply mesh.ply mesh_watertight.ply report.json report.html; do
   same "r1/$file" "r2/$file"
   same "r1/$file" "r3/$file"
 done
@@ -25,8 +25,8 @@ expect 0 inspect "$model" r1/mesh.ply -o mesh_report --tolerance -5,5
 # ---- detect, then register: the same as reconstruct
 # shellcheck disable=SC2086
 expect 0 detect "$model" $scans -o detected
-expect 0 register detected -o registered --mesh
-for file in result.json reconstruction.ply mesh.ply points.csv; do same "r1/$file" "registered/$file"; done
+expect 0 register detected -o registered --mesh --watertight
+for file in result.json reconstruction.ply mesh.ply mesh_watertight.ply points.csv; do same "r1/$file" "registered/$file"; done
 # The report says by which command it was made.
 for run in r1 registered; do sed '/"command": {/,/}/d' $run/report.json >report_of_$run.json; done
 same report_of_r1.json report_of_registered.json

@@ -71,10 +71,10 @@ struct DeviationReport {
   FaceMap face_map;
   std::vector<SurfacePart> faces, boxes;
   std::vector<Eigen::AlignedBox3d> box_extents;  ///< of `boxes`, model frame
-  std::vector<Region> regions;      ///< the largest of them
-  std::size_t regions_found = 0;    ///< all of them
-  Tolerance region_limits;         ///< what regions exceed where there is no tolerance
-  double significant_share = 0.0;  ///< of the scanned area: deviations that are not noise
+  std::vector<Region> regions;                   ///< the largest of them
+  std::size_t regions_found = 0;                 ///< all of them
+  Tolerance region_limits;                       ///< what regions exceed where there is no tolerance
+  double significant_share = 0.0;                ///< of the scanned area: deviations that are not noise
   std::optional<ReferenceReport> reference;
   std::optional<Verdict> verdict;            ///< absent without a tolerance
   std::shared_ptr<const SpotFinder> finder;  ///< answers what was measured at other places, by the same rules

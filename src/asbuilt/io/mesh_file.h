@@ -57,8 +57,9 @@ struct ModelFile {
 struct VertexValues {
   std::vector<float> deviation_mm;
   std::vector<std::array<std::uint8_t, 3>> colours;
+  std::vector<std::uint8_t> filled = {};  ///< 1 where nothing was measured
 };
-/// The same with the properties `deviation`, `red`, `green` and `blue`, as far as they are given.
+/// The same with the properties `deviation`, `red`, `green`, `blue` and `filled`, as far as they are given.
 [[nodiscard]] Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                                           const VertexValues& values);
 

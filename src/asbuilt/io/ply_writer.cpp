@@ -89,16 +89,19 @@ Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMes
   const bool has_deviation = !values.deviation_mm.empty(), has_colours = !values.colours.empty();
   ASBUILT_EXPECT(!has_deviation || values.deviation_mm.size() == mesh.vertices.size(), "a deviation per vertex");
   ASBUILT_EXPECT(!has_colours || values.colours.size() == mesh.vertices.size(), "a colour per vertex");
+  const bool has_filled = !values.filled.empty();
+  ASBUILT_EXPECT(!has_filled || values.filled.size() == mesh.vertices.size(), "a mark per vertex");
   constexpr std::size_t kCornerBytes = sizeof(std::int32_t);
-  const std::size_t vertex_bytes = 3 * sizeof(double) + (has_deviation ? sizeof(float) : 0) + (has_colours ? 3 : 0);
+  const std::size_t vertex_bytes =
+      3 * sizeof(double) + (has_deviation ? sizeof(float) : 0) + (has_colours ? 3 : 0) + (has_filled ? 1 : 0);
   const std::size_t face_bytes = 1 + (has_faces ? 4 : 3) * kCornerBytes;
   std::string content = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
       "z\n"
-      "{}{}element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
+      "{}{}{}element face {}\nproperty list uchar int vertex_indices\n{}end_header\n",
       mesh.vertices.size(), has_deviation ? "property float deviation\n" : "",
-      has_colours ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "", mesh.triangles.size(),
-      has_faces ? "property int cad_face\n" : "");
+      has_colours ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "",
+      has_filled ? "property uchar filled\n" : "", mesh.triangles.size(), has_faces ? "property int cad_face\n" : "");
   std::size_t target = content.size();
   content.resize(target + mesh.vertices.size() * vertex_bytes + mesh.triangles.size() * face_bytes);
   const auto put = [&](auto value) {
@@ -108,8 +111,10 @@ Result<void> write_mesh_ply(const std::filesystem::path& path, const TriangleMes
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) put(mesh.vertices[i][axis]);
     if (has_deviation) put(values.deviation_mm[i]);
-    if (!has_colours) continue;
-    for (const std::uint8_t channel : values.colours[i]) put(channel);
+    if (has_colours) {
+      for (const std::uint8_t channel : values.colours[i]) put(channel);
+    }
+    if (has_filled) put(values.filled[i]);
   }
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     put(std::uint8_t{3});

@@ -17,6 +17,8 @@
 namespace asbuilt::pipeline {
 namespace {
 
+constexpr const char* kClosedMesh = "mesh_watertight.ply";
+
 void drop(std::vector<PosedScan>& scans, const Contradiction& contradiction, io::RunRecord& record,
           const Context& context) {
   const auto position = scans.begin() + contradiction.member;
@@ -294,6 +296,17 @@ Result<void> inspect_and_report(const fuse::Reconstruction& reconstruction, cons
     const auto path = folder.file("mesh.ply");
     ASBUILT_CHECK(write_coloured_mesh(path, *mesh, model.prepared, *deviations, colours, context));
   }
+  folder.remove(kClosedMesh);
+  if (options.watertight) {
+    const auto written = write_closed_mesh(folder.file(kClosedMesh), model.prepared, *deviations, colours, context);
+    if (written) {
+      input.closed_mesh_file = kClosedMesh;
+    } else if (written.error().code == ErrorCode::not_possible) {
+      context.warn(fmt::format("no {}: {}", kClosedMesh, written.error().message));
+    } else {
+      return written;
+    }
+  }
   const auto path = folder.file("reconstruction.ply");
   ASBUILT_CHECK(write_reconstruction(path, reconstruction, deviations->deviation_mm, colours));
   return report::write_report(folder.file(""), input, context);
@@ -321,7 +334,7 @@ Result<void> register_scans(const LoadedModel& model, const Options& options, co
   ASBUILT_TRY(scans, load_posed_scans(record, folder));
   if (scans.empty()) {
     record.state = io::RunState::failed;
-    for (const char* stale : {"reconstruction.ply", "mesh.ply"}) folder.remove(stale);
+    for (const char* stale : {"reconstruction.ply", "mesh.ply", kClosedMesh}) folder.remove(stale);
     for (const std::string& stale : report::report_files()) folder.remove(stale);
     return {};
   }

@@ -159,6 +159,7 @@ io::Options recorded(const Options& options, std::initializer_list<Half> halves)
   record.emplace_back("joint_paper_mode", options.paper_mode);
   record.emplace_back("gauge", std::string(kGaugeNames[static_cast<int>(options.gauge)]));
   record.emplace_back("mesh", options.mesh);
+  record.emplace_back("watertight", options.watertight);
   std::vector<std::string> tolerance;
   if (options.inspect.tolerance) {
     tolerance = {fmt::format("{}", options.inspect.tolerance->low_mm),
@@ -199,6 +200,7 @@ Result<void> take_over(Options& options, const io::Options& record) {
   ASBUILT_CHECK(assign("paper_mode", options.paper_mode));
   ASBUILT_CHECK(assign("gauge", options.gauge));
   ASBUILT_CHECK(assign("mesh", options.mesh));
+  ASBUILT_CHECK(assign("watertight", options.watertight));
   Result<void> outcome;
   for_each_stage_field(options, [&](Half, const std::string& name, auto& value, std::string_view) {
     if (outcome) outcome = assign(name, value);

@@ -49,6 +49,7 @@ struct Options {
   double memory_gb = 0.0;   ///< what a scan may take; beyond it, it is thinned first; 0: half of the machine's
   bool paper_mode = false;  ///< exactly the published method, in every stage
   bool mesh = false;        ///< a surface mesh beside the cloud
+  bool watertight = false;  ///< a mesh without holes, filled from the CAD
   Gauge gauge = Gauge::best_fit;
   std::string tolerance_file;  ///< one tolerance per CAD face or box (docs/inspect.md); empty: none
   std::string reference;       ///< file of check points; empty: none

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/pipeline/report.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <utility>
 
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/inspect/closed_mesh.h"
 #include "asbuilt/io/mesh_file.h"
 #include "asbuilt/io/ply_writer.h"
 
@@ -131,6 +135,26 @@ Result<void> write_coloured_mesh(const std::filesystem::path& path, const Triang
     values.colours[i] = colours.colour(deviation);
   });
   return io::write_mesh_ply(path, mesh, values);
+}
+
+Result<void> write_closed_mesh(const std::filesystem::path& path, const model::PreparedModel& model,
+                               const inspect::DeviationReport& deviations, const report::ColourMap& colours,
+                               const Context& context) {
+  constexpr double kEdgeInSpacings = 2.0, kFinestRatio = 1.0 / 2000;  // no finer than the points, nor than is of use
+  inspect::ClosedMeshOptions options;
+  options.edge_length_mm = std::max(kEdgeInSpacings * deviations.spacing_mm, kFinestRatio * model.diameter);
+  ASBUILT_TRY(closed, inspect::closed_mesh(model, *deviations.finder, options, context));
+  io::VertexValues values;
+  for (const float deviation : closed.deviation_mm) {
+    const bool measured = !std::isnan(deviation);
+    values.colours.push_back(measured ? colours.colour(static_cast<double>(deviation))
+                                      : report::ColourMap::kNotScanned);
+  }
+  values.deviation_mm = std::move(closed.deviation_mm);
+  values.filled = std::move(closed.filled);
+  const Pose given_from_model = deviations.alignment.model_from_given.inverse(Eigen::Isometry);
+  for (Eigen::Vector3d& vertex : closed.mesh.vertices) vertex = given_from_model * vertex;
+  return io::write_mesh_ply(path, closed.mesh, values);
 }
 
 }  // namespace asbuilt::pipeline

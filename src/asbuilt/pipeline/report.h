@@ -33,4 +33,10 @@ namespace asbuilt::pipeline {
                                                const inspect::DeviationReport& deviations,
                                                const report::ColourMap& colours, const Context& context);
 
+/// The mesh without holes (inspect/closed_mesh.h) in the frame of the reconstruction: `deviation` is NaN, `filled` 1 and
+/// the colour that of what was not scanned where nothing was measured. Errors: also not_possible, if nothing was.
+[[nodiscard]] Result<void> write_closed_mesh(const std::filesystem::path& path, const model::PreparedModel& model,
+                                             const inspect::DeviationReport& deviations,
+                                             const report::ColourMap& colours, const Context& context);
+
 }  // namespace asbuilt::pipeline

@@ -34,6 +34,7 @@ struct ReportInput {
   std::optional<InputFile> reference_file = {};
   std::optional<std::string> cloud_file = {};  ///< what was written with deviations, relative to the report
   std::optional<std::string> mesh_file = {};
+  std::optional<std::string> closed_mesh_file = {};  ///< the watertight one
   bool views = false;  ///< also pictures, without a browser
   bool steps = false;  ///< pictures in discrete colours
 };

@@ -139,6 +139,7 @@ Json files_json(const ReportInput& input) {
   const bool has_scans = !input.record.scans.empty();
   return {{"reconstruction", input.cloud_file ? Json(*input.cloud_file) : Json(nullptr)},
           {"mesh", input.mesh_file ? Json(*input.mesh_file) : Json(nullptr)},
+          {"mesh_watertight", input.closed_mesh_file ? Json(*input.closed_mesh_file) : Json(nullptr)},
           {"points_csv", "points.csv"},
           {"faces_csv", "faces.csv"},
           {"regions_csv", "regions.csv"},
