@@ -104,15 +104,20 @@ std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& clo
 
 // At a rim the sensor may have mixed the part with what stands behind it, and the surface ends there: such a point is
 // biased rather than noisy. It counts so little that it decides nothing where there are others, but not nothing: where
-// two scans share only their rims, these still hold them together.
+// two scans share only their rims, these still hold them together. Of a part of small features nearly all is near a rim,
+// among it what holds the pose best: at most half of a view's weight is given up.
 std::vector<float> rim_weights(const SampledView& view, double scan_spacing_mm, const Context& context) {
-  constexpr float kNearRim = 0.03F;
+  constexpr double kNearRim = 0.03, kLeastLeft = 0.5;
   const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
   std::vector<char> rim(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) rim[i] = places[i] == Place::rim ? 1 : 0;
   const std::vector<char> near_rim = dilated(rim, view.points, kRimInSpacings * scan_spacing_mm, context);
+  const auto all = static_cast<double>(near_rim.size());
+  const auto near = static_cast<double>(std::ranges::count(near_rim, 1));
+  const double wanted = near > 0.0 ? (kLeastLeft * all - (all - near)) / near : 1.0;
+  const auto weight = static_cast<float>(std::max(kNearRim, wanted));
   std::vector<float> weights(places.size());
-  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = near_rim[i] != 0 ? kNearRim : 1.0F;
+  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = near_rim[i] != 0 ? weight : 1.0F;
   return weights;
 }
 

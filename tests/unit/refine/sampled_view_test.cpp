@@ -92,5 +92,23 @@ TEST(BorderPoints, OfTwoScannedWallsAreAnEdgeAndNoRim) {
   }
 }
 
+TEST(RimWeights, GiveUpNoMoreThanHalfOfAView) {
+  const auto weights = [](int n) { return sampled_view(plate(n, 0.0), 0.0, {}, Context(2)).weight; };
+  const auto sum = [](const std::vector<float>& all) {
+    double total = 0.0;
+    for (const float weight : all) total += static_cast<double>(weight);
+    return total / static_cast<double>(all.size());
+  };
+  // 81 points wide, five and the rim itself on either side are near the rim: less than half of them.
+  const std::vector<float> wide = weights(81), narrow = weights(25);
+  EXPECT_FLOAT_EQ(*std::ranges::min_element(wide), 0.03F);
+  EXPECT_GT(sum(wide), 0.5);
+  // 25 wide, two thirds and more are near: they keep as much as makes half.
+  EXPECT_NEAR(sum(narrow), 0.5, 1e-6);
+  EXPECT_EQ(*std::ranges::max_element(narrow), 1.0F);
+  // 9 wide, all are: they count alike.
+  EXPECT_NEAR(sum(weights(9)), 0.5, 1e-6);
+}
+
 }  // namespace
 }  // namespace asbuilt::refine
