@@ -26,6 +26,7 @@ struct Arguments {
 };
 
 Result<void> append(const Arguments& args, const std::vector<Trial>& trials) {
+  if (trials.empty()) return {};  // `one` prints, and has no folder
   std::ofstream file(args.out / "trials.jsonl", std::ios::app);
   for (const Trial& trial : trials) {
     const nlohmann::ordered_json json{{"kind", trial.kind}, {"scene", trial.scene},     {"variant", trial.variant},

@@ -76,7 +76,7 @@ void level_along_short_edges(std::vector<Spot>& spots, const model::SurfaceMesh&
   }
 }
 
-/// The shortest displacement whose component along each measured normal is the deviation there.
+/// Of a place of the surface.
 struct Displacement {
   Eigen::Vector3d vector = Eigen::Vector3d::Zero();
   float deviation_mm = std::numeric_limits<float>::quiet_NaN();  ///< the largest, if any was measured
@@ -84,6 +84,7 @@ struct Displacement {
   [[nodiscard]] bool is_measured() const { return !std::isnan(deviation_mm); }
 };
 
+/// The shortest displacement whose component along each measured normal is the deviation there.
 Displacement displacement_of(std::span<const std::uint32_t> vertices, const std::vector<Eigen::Vector3f>& normals,
                              const std::vector<Spot>& spots) {
   Displacement result;
@@ -146,7 +147,8 @@ void fill(std::vector<Displacement>& displacements, const std::vector<model::Edg
   }
 }
 
-/// Loops of edges, each as its vertices, that close the mesh when triangles run them this way round.
+/// Loops of edges, each as its vertices, that close the mesh when triangles run them this way round. As many such edges
+/// lead into a vertex as out of it, so each path ends where it began.
 std::vector<std::vector<int>> open_loops(const std::vector<model::EdgeSide>& sides) {
   std::map<int, std::vector<int>> ends_from;  // edges that are wanted, from their first vertex
   model::for_each_edge(sides, [&](std::span<const model::EdgeSide> faces) {
@@ -178,7 +180,7 @@ std::vector<std::vector<int>> open_loops(const std::vector<model::EdgeSide>& sid
   return loops;
 }
 
-/// As many edges lead into a vertex of open loops as out of it, so each path ends where it began.
+/// A fan over each open loop.
 void close_holes(ClosedMesh& closed, const std::vector<model::EdgeSide>& sides) {
   TriangleMesh& mesh = closed.mesh;
   for (const std::vector<int>& loop : open_loops(sides)) {
