@@ -97,15 +97,18 @@ DepthImage::Evidence DepthImage::evidence(const Eigen::Vector3d& point_in_scan, 
   const Cell c = cell(point_in_scan);
   if (c.face < 0) return Evidence::unknown;
   const auto tolerance = static_cast<float>(tolerance_mm);
-  int nearer = 0, farther = 0;
+  int nearer = 0, alike = 0, farther = 0;
   for (int row = c.row - 1; row <= c.row + 1; ++row) {
     for (int column = c.column - 1; column <= c.column + 1; ++column) {
       const float depth = depth_at(c.face, row, column);
       if (depth == kNothing) continue;
-      if (std::abs(depth - c.depth) <= tolerance) return Evidence::near;
-      depth < c.depth ? ++nearer : ++farther;
+      ++(std::abs(depth - c.depth) <= tolerance ? alike : depth < c.depth ? nearer : farther);
     }
   }
+  // What is measured beside the edge of something in front says nothing about what lies behind that.
+  const float straight = depth_at(c.face, c.row, c.column);
+  const bool is_covered = straight < c.depth - tolerance;
+  if (alike > 0) return is_covered ? Evidence::hidden : Evidence::near;
   // One stray return proves nothing, and where both sides are seen an edge passes.
   constexpr int kEnough = 2;
   if (nearer >= kEnough && farther == 0) return Evidence::hidden;

@@ -83,6 +83,17 @@ TEST(DepthImage, IsUndecidedAtTheEdgeOfASurface) {
   EXPECT_EQ(image.evidence({0, 0, 80}, 2.0), Evidence::unknown);
 }
 
+// What is measured past the edge of a surface in front says nothing about what lies behind that surface.
+TEST(DepthImage, BehindTheEdgeOfSomethingInFrontAllIsHidden) {
+  std::vector<Eigen::Vector3f> points;
+  for (const Eigen::Vector3f& p : test::plane_cloud(80.0, 1.0, 100.0, 0.0, 1).positions) {
+    points.emplace_back(p.x(), p.y(), p.x() < 0.0F ? 60.0F : 100.0F);
+  }
+  const DepthImage image(points, 1.0, {Viewpoint::Kind::direction, Eigen::Vector3d::UnitZ()});
+  EXPECT_EQ(image.evidence({-1.5, 0, 100}, 2.0), Evidence::hidden);
+  EXPECT_EQ(image.evidence({1.5, 0, 100}, 2.0), Evidence::near);
+}
+
 TEST(DepthImage, BelievesNoSingleStrayReturn) {
   const std::vector<Eigen::Vector3f> stray{{0, 0, 50}};
   const DepthImage image(stray, 1.0, {Viewpoint::Kind::direction, Eigen::Vector3d::UnitZ()});

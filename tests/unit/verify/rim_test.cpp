@@ -124,7 +124,7 @@ TEST(Rim, RoundedEdgesHaveOneToo) {
     const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
     const RimEvidence found = rim_evidence(scan_from_model.inverse(), all, 3.0, evidence,
                                            {kDistance, std::max(kDistance, 2.5 * scan.spacing_mm)});
-    EXPECT_GT(found.asked, 25U);
+    EXPECT_GT(found.asked, 15U) << "without probes there: none";
     return found.overrun_share();
   };
   EXPECT_EQ(share(60.0), 0.0);
