@@ -11,7 +11,7 @@
 
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/robust.h"
-#include "asbuilt/refine/point_to_plane.h"
+#include "asbuilt/refine/edge_residual.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -32,40 +32,6 @@ std::vector<Task> blocks_of(std::span<const DirectedEdge> edges) {
   }
   return tasks;
 }
-
-// The residual of a match, with positions relative to `origin` (which keeps the rotation columns small).
-class EdgeResidualFunction {
- public:
-  EdgeResidualFunction(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
-                       const Eigen::Vector3d& origin, bool symmetric)
-      : source_(views[static_cast<std::size_t>(edge.source)].points),
-        target_(views[static_cast<std::size_t>(edge.target)].points),
-        source_pose_(poses[static_cast<std::size_t>(edge.source)]),
-        target_pose_(poses[static_cast<std::size_t>(edge.target)]),
-        origin_(origin),
-        symmetric_(symmetric) {}
-
-  [[nodiscard]] Eigen::Vector3d position(const Match& match) const {
-    return source_pose_ * source_.positions[match.source].cast<double>() - origin_;
-  }
-
-  [[nodiscard]] ResidualWithJacobian operator()(const Match& match) const {
-    const Eigen::Vector3d p = position(match);
-    const Eigen::Vector3d q = target_pose_ * target_.positions[match.target].cast<double>() - origin_;
-    const Eigen::Vector3d normal_q = target_pose_.linear() * target_.normals[match.target].cast<double>();
-    if (!symmetric_) return point_to_plane(p, q, normal_q);
-    const Eigen::Vector3d normal_p = source_pose_.linear() * source_.normals[match.source].cast<double>();
-    return symmetric_point_to_plane(p, normal_p, q, normal_q);
-  }
-
- private:
-  const PointCloud& source_;
-  const PointCloud& target_;
-  const Pose& source_pose_;
-  const Pose& target_pose_;
-  Eigen::Vector3d origin_;
-  bool symmetric_;
-};
 
 }  // namespace
 
@@ -277,18 +243,53 @@ std::vector<Matrix6d> NormalEquations::blocks_with(const Solver& solver) const {
   return blocks;
 }
 
-std::vector<Matrix6d> NormalEquations::inverse_blocks() const {
+template <class Solver>
+std::vector<Matrix6d> NormalEquations::strewn_with(const Solver& solver, std::span<const CellGradient> cells) const {
+  constexpr std::uint32_t kTogether = 128;  // columns, so that memory does not grow with the number of cells
+  std::vector<Matrix6d> blocks(static_cast<std::size_t>(views_), Matrix6d::Zero());
+  for (std::size_t begin = 0, end = 0; begin < cells.size(); begin = end) {
+    const std::uint32_t first_cell = cells[begin].cell;
+    while (end < cells.size() && cells[end].cell - first_cell < kTogether) ++end;
+    Eigen::MatrixXd gradients =
+        Eigen::MatrixXd::Zero(gradient_.size(), Eigen::Index{cells[end - 1].cell - first_cell} + 1);
+    for (const CellGradient& cell : cells.subspan(begin, end - begin)) {
+      const LinkBlock& link = links_[cell.link];
+      const int a = unknown_of(link.first), b = unknown_of(link.second);
+      const Eigen::Index column = cell.cell - first_cell;
+      if (a >= 0) gradients.col(column).segment<6>(a) += cell.gradient;
+      if (b >= 0) gradients.col(column).segment<6>(b) -= cell.gradient;
+    }
+    const Eigen::MatrixXd responses = solver.solve(gradients);
+    for (int view = 0; view < views_; ++view) {
+      if (view == fixed_view_) continue;
+      const auto rows = responses.middleRows<6>(unknown_of(view));
+      blocks[static_cast<std::size_t>(view)] += rows * rows.transpose();
+    }
+  }
+  return blocks;
+}
+
+template <class Work>
+auto NormalEquations::with_solver(const Work& work) const {
   const Eigen::Index size = gradient_.size();
   const auto unknown = [this](int view) { return unknown_of(view); };
   const double tiny = mean_information_ > 0.0 ? kTinyDamping * mean_information_ : 1.0;
   if (size <= kDenseUnknowns) {
     Eigen::MatrixXd matrix = dense_matrix(links_, size, unknown);
     matrix.diagonal().array() += tiny;
-    return blocks_with(Eigen::LDLT<Eigen::MatrixXd>(matrix));
+    return work(Eigen::LDLT<Eigen::MatrixXd>(matrix));
   }
   Eigen::SparseMatrix<double> matrix = sparse_matrix(links_, size, unknown);
   matrix += Eigen::SparseMatrix<double>(Eigen::VectorXd::Constant(size, tiny).asDiagonal());
-  return blocks_with(Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix));
+  return work(Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(matrix));
+}
+
+std::vector<Matrix6d> NormalEquations::inverse_blocks() const {
+  return with_solver([&](const auto& solver) { return blocks_with(solver); });
+}
+
+std::vector<Matrix6d> NormalEquations::strewn_blocks(std::span<const CellGradient> cells) const {
+  return with_solver([&](const auto& solver) { return strewn_with(solver, cells); });
 }
 
 double NormalEquations::unheld_variance() const {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -70,6 +71,13 @@ struct LocalInformation {
 [[nodiscard]] LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling,
                                   double threshold);
 
+/// What the matches of one link in one cube of space say: their share of the gradient of Eq. 5, by the pose of `first`.
+struct CellGradient {
+  std::uint32_t cell = 0;  ///< numbers from 0 on; a cube has the same number for all links
+  std::uint32_t link = 0;
+  Vector6d gradient = Vector6d::Zero();
+};
+
 /// The normal equations of all views but the fixed one, six unknowns each.
 class NormalEquations {
  public:
@@ -83,6 +91,11 @@ class NormalEquations {
   /// Diagonal 6x6 blocks of the inverse, a tiny damping included: directions that nothing holds come out huge, not NaN.
   [[nodiscard]] std::vector<Matrix6d> inverse_blocks() const;
 
+  /// Diagonal 6x6 blocks of H^-1 (sum over cells of g g^T) H^-1: how far the solution would be strewn if each cell's
+  /// gradient were drawn anew, independently of the others'. `cells` is ordered by cell; its links are those of the
+  /// constructor. Directions that nothing holds come out huge.
+  [[nodiscard]] std::vector<Matrix6d> strewn_blocks(std::span<const CellGradient> cells) const;
+
   /// Entries of inverse_blocks() above this belong to directions that nothing holds.
   [[nodiscard]] double unheld_variance() const;
 
@@ -92,6 +105,10 @@ class NormalEquations {
   [[nodiscard]] int unknown_of(int view) const;  // first unknown, or -1
   template <class Solver>
   [[nodiscard]] std::vector<Matrix6d> blocks_with(const Solver& solver) const;
+  template <class Solver>
+  [[nodiscard]] std::vector<Matrix6d> strewn_with(const Solver& solver, std::span<const CellGradient> cells) const;
+  template <class Work>
+  [[nodiscard]] auto with_solver(const Work& work) const;
 
   int views_, fixed_view_;
   std::vector<LinkBlock> links_;

@@ -13,6 +13,7 @@
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/refine/cell_gradients.h"
 #include "asbuilt/refine/correspondences.h"
 #include "asbuilt/refine/normal_equations.h"
 #include "asbuilt/refine/sampled_view.h"
@@ -30,6 +31,7 @@ constexpr double kMinWeight = 1e-3;       // of an edge whose residuals are wide
 constexpr double kCoarseMotion = 0.5;     // in units of noise: near enough for the full sample
 constexpr double kHeldInSpreads = 1.0;    // squared spreads of the normals that an edge must hold more than
 constexpr double kMinHeld = 1e-7, kMaxHeld = 5e-3;  // bounds of the rank threshold of an edge
+constexpr double kAlikeInRadii = 0.4;               // of a view: so far apart, errors of matches have little in common
 constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
 double squared(double x) { return x * x; }
@@ -82,6 +84,19 @@ int view_with_most_points(std::span<const View> views) {
   const auto most = std::ranges::max_element(
       views, {}, [](const View& view) { return view.segment_in_scan.size(); });  // the first of equals
   return static_cast<int>(most - views.begin());
+}
+
+// A covariance (its eigenvectors, and variances, ascending) that is nowhere less than `least`, by its first `held`
+// directions; the others stay.
+Matrix6d widened(const Matrix6d& motions, const Vector6d& variances, Eigen::Index held, const Matrix6d& least) {
+  const Matrix6d own = motions * variances.asDiagonal() * motions.transpose();
+  if (held == 0 || !(variances.head(held).minCoeff() > 0.0)) return own;
+  const Eigen::MatrixXd unit = motions.leftCols(held) * variances.head(held).cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(unit.transpose() * least * unit);
+  const Eigen::MatrixXd wide =
+      motions.leftCols(held) * variances.head(held).cwiseSqrt().asDiagonal() * ratios.eigenvectors();
+  const Eigen::VectorXd more = (ratios.eigenvalues().array() - 1.0).cwiseMax(0.0);
+  return own + wide * more.asDiagonal() * wide.transpose();
 }
 
 // The refinement of one component; the functions below are its steps in the order in which they happen.
@@ -349,12 +364,13 @@ class JointRefinement {
     if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
     result.rms_after_mm = pooled_rms(sums);
     describe_edges(sums, result);
+    const std::vector<Matrix6d> strewn = strewn_blocks(sums);
     // A doubtful match is biased rather than noisy: its small weight would make the pose look as if nothing held it.
     for (DirectedEdge& edge : edges_) {
       for (Match& match : edge.matches) match.weight = 1.0F;
     }
     const std::vector<EdgeSums> plain = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
-    describe_uncertainty(normal_equations(plain), plain, unit_variance(plain), result);
+    describe_uncertainty(normal_equations(plain), plain, unit_variance(plain), strewn, result);
     for (std::size_t l = 0; l < links_.size(); ++l) result.link_holds.push_back(hold_of_link(l, both_ways(l, plain)));
     return {};
   }
@@ -385,8 +401,26 @@ class JointRefinement {
                      views_[v].radius_mm, usual_scale_, diameter_);
   }
 
+  // How far the poses would be strewn by errors that are alike within a part of a view, and different from one such
+  // part to the next. In scaled twists.
+  [[nodiscard]] std::vector<Matrix6d> strewn_blocks(std::span<const EdgeSums> sums) const {
+    std::vector<double> radii;
+    for (const SampledView& view : views_) radii.push_back(view.radius_mm);
+    const double cell_mm = std::max(kAlikeInRadii * median_of(std::move(radii)), 1e-6 * scaling_.length_mm);
+    std::vector<CellGradient> cells =
+        cell_gradients(edges_, views_, poses_, scaling_, options_.symmetric, cell_mm, context_);
+    if (options_.drop_unheld) {
+      for (CellGradient& cell : cells) {
+        LinkBlock part;
+        part.gradient = cell.gradient;
+        cell.gradient = held_part(part, both_ways(cell.link, sums), scaling_, held_threshold(cell.link)).gradient;
+      }
+    }
+    return normal_equations(sums).strewn_blocks(cells);
+  }
+
   void describe_uncertainty(const NormalEquations& equations, std::span<const EdgeSums> sums, double variance,
-                            Refinement& result) const {
+                            std::span<const Matrix6d> strewn, Refinement& result) const {
     const std::vector<Matrix6d> inverse = equations.inverse_blocks();
     const Matrix6d twist_from_scaled = scaling_.twist_from_scaled();
     for (std::size_t v = 0; v < views_.size(); ++v) {
@@ -405,7 +439,8 @@ class JointRefinement {
         if (unheld) result.unheld.push_back(unheld_direction(static_cast<int>(v), eigen.eigenvectors().col(i), sums));
       }
       const Matrix6d scaled = eigen.eigenvectors() * variances.asDiagonal() * eigen.eigenvectors().transpose();
-      result.covariance.push_back(twist_from_scaled * scaled * twist_from_scaled.transpose());
+      const Matrix6d honest = widened(eigen.eigenvectors(), variances, 6 - free, strewn[v]);
+      result.covariance.push_back(twist_from_scaled * honest * twist_from_scaled.transpose());
       result.view_holds.push_back(hold_of_view(v, scaled, eigen.eigenvectors().rightCols(free)));
     }
   }

@@ -88,9 +88,10 @@ struct UnheldDirection {
 struct Refinement {
   int fixed_view = 0;                 ///< the view with most points on the model
   std::vector<Pose> model_from_scan;  ///< one a view; the fixed view keeps its start
-  /// Of the twist (rotation rad, translation mm) applied on the left; zero for the fixed one. From the inverse normal
-  /// matrix and the residual variance, as if correspondences were independent: they are not, so it is a lower bound.
-  /// Along an unheld direction the standard deviation is one diameter of the views: "unknown".
+  /// Of the twist (rotation rad, translation mm) applied on the left; zero for the fixed one. The larger, in every
+  /// direction, of what the residual variance gives if matches were independent, and of what their sums over parts of a
+  /// view show (a sandwich of clusters: Liang and Zeger, Biometrika 1986). Along an unheld direction the standard
+  /// deviation is one diameter of the views: "unknown".
   std::vector<Matrix6d> covariance;
   int iterations = 0;
   bool converged = false;

@@ -60,6 +60,7 @@ struct SceneOptions {
   double sigma = 0.1;          // mm, along the line of sight
   double normal_noise = 0.03;  // rad, each axis
   double start_error = 1.0;    // mm at the body's surface, about: half of it shift, half rotation
+  double alike_error = 0.0;    // mm, along the line of sight: a wave half as long as the radius, of each view
 };
 
 inline PointCloud body_seen_from(const Eigen::Vector3d& sensor_direction, int points, double sigma, double normal_noise,
@@ -85,8 +86,15 @@ inline Scene bumpy_scene(const SceneOptions& options, std::uint64_t seed) {
     const double turn = 2.0 * 3.14159265358979 * v / options.views;
     const double tilt = (v % 2 == 0) ? 0.5 : -0.5;
     sensors.push_back(Eigen::Vector3d(std::cos(turn), std::sin(turn), tilt).normalized());
-    const PointCloud in_model =
-        body_seen_from(sensors.back(), options.points, options.sigma, options.normal_noise, random);
+    PointCloud in_model = body_seen_from(sensors.back(), options.points, options.sigma, options.normal_noise, random);
+    if (options.alike_error > 0.0) {
+      const Eigen::Vector3d wave = random_direction(random) * (2.0 * 3.14159265358979 / 25.0);
+      const double phase = random.uniform(0.0, 6.28);
+      for (Eigen::Vector3f& p : in_model.positions) {
+        const double along = options.alike_error * std::sqrt(2.0) * std::sin(wave.dot(p.cast<double>()) + phase);
+        p += (along * sensors.back()).cast<float>();
+      }
+    }
     const Pose truth = random_pose(random, 3.0, 300.0);
     refine::View view;
     for (std::size_t i = 0; i < in_model.size(); ++i) {
