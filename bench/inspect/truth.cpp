@@ -12,16 +12,25 @@ namespace {
 // Beyond the angle at which the virtual scanner gets no returns at all a place cannot be scanned.
 const double kCosLimit = std::cos(simulate::NoiseModel{}.grazing_deg * std::numbers::pi / 180.0);
 
+TriangleMesh moved(TriangleMesh mesh, const Pose& motion) {
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex = motion * vertex;
+  return mesh;
+}
+
 }  // namespace
 
-InspectionTruth::InspectionTruth(const simulate::Simulation& simulation)
-    : rays_(simulation.as_built),
-      surface_(simulation.as_built),
+InspectionTruth::InspectionTruth(const simulate::Simulation& simulation, const Pose& aligned_from_true)
+    : InspectionTruth(simulation, moved(simulation.as_built, aligned_from_true), aligned_from_true) {}
+
+InspectionTruth::InspectionTruth(const simulate::Simulation& simulation, const TriangleMesh& as_built,
+                                 const Pose& aligned_from_true)
+    : rays_(as_built),
+      surface_(as_built),
       cad_(simulation.model),
-      true_vertices_(simulation.as_built.vertices),
+      true_vertices_(as_built.vertices),
       reach_mm_(0.02 * diameter(simulation.model)) {
   for (const simulate::SimulatedScan& scan : simulation.scans) {
-    if (scan.model_from_scan) sensors_in_model_.emplace_back(scan.model_from_scan->translation());
+    if (scan.model_from_scan) sensors_in_model_.emplace_back(aligned_from_true * scan.model_from_scan->translation());
   }
 }
 

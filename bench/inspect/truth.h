@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "asbuilt/core/point_cloud.h"
+#include "asbuilt/core/pose.h"
 #include "asbuilt/model/ray_scene.h"
 #include "asbuilt/model/surface_distance.h"
 #include "asbuilt/simulate/as_built.h"
@@ -16,7 +17,8 @@ namespace asbuilt::bench {
 /// What a perfect inspection would say at places of the CAD surface.
 class InspectionTruth {
  public:
-  explicit InspectionTruth(const simulate::Simulation& simulation);
+  /// The true part is held against the CAD where `aligned_from_true` puts it: a deviation is one in an alignment.
+  InspectionTruth(const simulate::Simulation& simulation, const Pose& aligned_from_true);
 
   /// Whether any scan could see the place: it faces the sensor by less than the angle at which the last returns fade
   /// (NoiseModel::grazing_deg) and nothing of the part stands between.
@@ -31,6 +33,8 @@ class InspectionTruth {
   [[nodiscard]] std::optional<double> deviation(const Eigen::Vector3d& position) const;
 
  private:
+  InspectionTruth(const simulate::Simulation& simulation, const TriangleMesh& as_built, const Pose& aligned_from_true);
+
   model::RayScene rays_;
   model::SurfaceDistance surface_, cad_;
   std::vector<Eigen::Vector3d> true_vertices_;  // fine about the bumps
