@@ -126,6 +126,12 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
         "measurements more than for one a tenth larger or smaller.\n",
         best.size_lead);
   }
+  if (best.lost_end_share > 0.0) {  // NaN: from an older run
+    text += fmt::format(
+        "  Ends: {:.1f} % of what was looked at gave nothing back at an end of the part whose place nothing else "
+        "tells{}.\n",
+        100.0 * best.lost_end_share, percent_allowed(record, "max_lost_end_share"));
+  }
   if (std::isnan(best.overrun_share)) return text;
   text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
                       percent_allowed(record, "max_overrun_share"));

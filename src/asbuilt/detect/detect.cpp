@@ -20,6 +20,13 @@ std::vector<std::uint32_t> drawn_order(std::size_t samples) {
   return order;
 }
 
+// One voting answers for all looks.
+DetectOptions with_most_peaks(DetectOptions options) {
+  options.peaks_per_reference = std::max(options.peaks_per_reference, options.last_peaks_per_reference);
+  options.peak_ratio = std::min(options.peak_ratio, options.last_peak_ratio);
+  return options;
+}
+
 std::vector<Hypothesis> hypotheses_of(const std::vector<Peak>& peaks, const Codebook& codebook,
                                       const Pose& scene_frame) {
   std::vector<Hypothesis> hypotheses;
@@ -83,7 +90,7 @@ Result<void> HypothesisSearch::vote_until(std::size_t last, const Context& conte
   std::vector<std::vector<Hypothesis>> found((last - voted_) * signs);
   std::vector<std::uint64_t> cast(found.size());
   parallel_for_blocks(context, found.size(), 16, [&](std::size_t begin, std::size_t end) {
-    LocalVoting voting(codebook_, scene_, options_);
+    LocalVoting voting(codebook_, scene_, with_most_peaks(options_));
     for (std::size_t i = begin; i < end && !context.cancelled(); ++i) {
       const std::uint32_t reference = order_[voted_ + i / signs];
       const float sign = i % signs == 0 ? 1.0F : -1.0F;
@@ -94,16 +101,27 @@ Result<void> HypothesisSearch::vote_until(std::size_t last, const Context& conte
     }
   });
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while detecting");
-  for (const std::vector<Hypothesis>& some : found) found_.insert(found_.end(), some.begin(), some.end());
+  for (const std::vector<Hypothesis>& some : found) {
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      found_.push_back(some[k]);
+      is_best_.push_back(k < static_cast<std::size_t>(options_.peaks_per_reference) &&
+                         some[k].votes >= options_.peak_ratio * some.front().votes);
+    }
+  }
   votes_cast_ = std::accumulate(cast.begin(), cast.end(), votes_cast_);
   voted_ = last;
   return {};
 }
 
-std::vector<Hypothesis> HypothesisSearch::hypotheses(int most, const Context& context) const {
+std::vector<Hypothesis> HypothesisSearch::hypotheses(int most, const Context& context, Maxima maxima) const {
   const ClusterOptions cluster{options_.cluster_angle_deg * std::numbers::pi / 180.0,
                                options_.cluster_distance_ratio * codebook_.diameter, most};
-  return cluster_poses(found_, codebook_.centre, cluster, context);
+  if (maxima == Maxima::many) return cluster_poses(found_, codebook_.centre, cluster, context);
+  std::vector<Hypothesis> best;
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    if (is_best_[i] != 0) best.push_back(found_[i]);
+  }
+  return cluster_poses(best, codebook_.centre, cluster, context);
 }
 
 }  // namespace asbuilt::detect

@@ -23,6 +23,10 @@ namespace asbuilt::detect {
                                     const Context& context);
 [[nodiscard]] Scene detection_scene(const scan::Scan& scan, const SampledScan& sampled, const DetectOptions& options);
 
+/// Which maxima of the voting spaces are clustered: those that are about the best of their reference point, or also
+/// those far below, of which only many reference points in agreement make a strong cluster.
+enum class Maxima { best, many };
+
 /// Local voting per scene reference point (Eq. 6-10), then pose clusters; it can be gone on with: the more reference
 /// points have voted, the smaller a part it finds. They are a random draw, the first of which are the same however many
 /// follow, and results depend on their number alone, not on the steps in which they voted or on threads.
@@ -38,7 +42,8 @@ class HypothesisSearch {
                                   double most_votes = std::numeric_limits<double>::infinity());
 
   /// The at most `most` strongest clusters of what has been voted for, by decreasing votes.
-  [[nodiscard]] std::vector<Hypothesis> hypotheses(int most, const Context& context) const;
+  [[nodiscard]] std::vector<Hypothesis> hypotheses(int most, const Context& context,
+                                                   Maxima maxima = Maxima::best) const;
 
   [[nodiscard]] std::uint64_t votes_cast() const { return votes_cast_; }
 
@@ -54,6 +59,7 @@ class HypothesisSearch {
   std::vector<std::uint32_t> order_;  // of the reference points
   std::size_t voted_ = 0;
   std::vector<Hypothesis> found_;
+  std::vector<std::uint8_t> is_best_;  // of found_, by peaks_per_reference and peak_ratio
   std::uint64_t votes_cast_ = 0;
 };
 

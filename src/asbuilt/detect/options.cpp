@@ -26,6 +26,8 @@ Result<void> DetectOptions::validate() const {
   ASBUILT_CHECK(expect_between("last_hypotheses", last_hypotheses, 1, 100000));
   ASBUILT_CHECK(expect_between("peaks_per_reference", peaks_per_reference, 1, 100));
   ASBUILT_CHECK(expect_between("peak_ratio", peak_ratio, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("last_peaks_per_reference", last_peaks_per_reference, 1, 1000));
+  ASBUILT_CHECK(expect_between("last_peak_ratio", last_peak_ratio, 0.0, 1.0));
   return {};
 }
 

@@ -21,11 +21,13 @@ struct DetectOptions {
   int max_hypotheses = 200;              ///< clusters handed to verification; paper: some 50
   int last_reference_points = 5000;      ///< scene reference points of a last look; 0: none is taken
   double most_million_votes = 1500.0;    ///< the last look ends when so many have been cast
-  int last_hypotheses = 400;             ///< clusters of the last look that are verified
+  int last_hypotheses = 1500;            ///< clusters of the last look that are verified
   double cluster_angle_deg = 15.0;       ///< poses closer than this in rotation ...
   double cluster_distance_ratio = 0.06;  ///< ... and than this share of the diameter at the model's centre are one
   int peaks_per_reference = 3;           ///< maxima of one voting space that are kept, if close to the best
   double peak_ratio = 0.85;              ///< "close": share of the best maximum's votes
+  int last_peaks_per_reference = 20;     ///< the same in the last look, where what agrees from many reference points
+  double last_peak_ratio = 0.3;          ///< need be among the best of none
   bool paper_mode = false;               ///< exactly the published method
 
   [[nodiscard]] Result<void> validate() const;
@@ -40,6 +42,7 @@ struct DetectOptions {
     published.peaks_per_reference = 1;
     published.first_reference_points = 0;
     published.last_reference_points = 0;
+    published.last_peaks_per_reference = 1;
     published.max_hypotheses = 50;
     return published;
   }
@@ -70,6 +73,8 @@ void for_each_field(DetectOptions& options, Visitor&& field) {
   field("cluster_distance_ratio", options.cluster_distance_ratio, "distance / diameter within which they are");
   field("peaks_per_reference", options.peaks_per_reference, "maxima kept per reference point");
   field("peak_ratio", options.peak_ratio, "votes of a further maximum / votes of the best");
+  field("last_peaks_per_reference", options.last_peaks_per_reference, "maxima kept per reference point in a last look");
+  field("last_peak_ratio", options.last_peak_ratio, "votes of a further maximum / votes of the best in a last look");
 }
 
 }  // namespace asbuilt::detect

@@ -78,6 +78,7 @@ Json json_of(const CandidateRecord& candidate) {
           {"slip_lead", json_number(candidate.slip_lead)},
           {"size_hold", json_number(candidate.size_hold)},
           {"size_lead", json_number(candidate.size_lead)},
+          {"lost_end_share", json_number(candidate.lost_end_share)},
           {"overrun_share", json_number(candidate.overrun_share)},
           {"objection", candidate.objection}};
 }
@@ -259,6 +260,7 @@ CandidateRecord candidate_of(const Json& json) {
   candidate.slip_lead = later_number_at(json, "slip_lead");
   candidate.size_hold = later_number_at(json, "size_hold");
   candidate.size_lead = later_number_at(json, "size_lead");
+  candidate.lost_end_share = later_number_at(json, "lost_end_share");
   candidate.overrun_share = later_number_at(json, "overrun_share");
   candidate.objection = json.value("objection", "");
   return candidate;

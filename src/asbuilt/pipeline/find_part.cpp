@@ -44,11 +44,12 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     sampled = detect::sampled_scan(scan, model.sampling_distance, model.diameter, context);
     search.emplace(scan, sampled, codebook, options.detect);
   });
-  const auto propose = [&](int reference_points, double most_votes, int most_hypotheses) {
+  const auto propose = [&](int reference_points, double most_votes, int most_hypotheses,
+                           detect::Maxima maxima = detect::Maxima::best) {
     Result<void> voted;
     timed("detect", [&] {
       voted = search->vote(reference_points, context, most_votes);
-      if (voted) found.hypotheses = with_starts(starts, search->hypotheses(most_hypotheses, context));
+      if (voted) found.hypotheses = with_starts(starts, search->hypotheses(most_hypotheses, context, maxima));
     });
     found.votes_cast = search->votes_cast();
     ++found.looks;
@@ -91,7 +92,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
   const double most_votes = 1e6 * options.detect.most_million_votes;
   const bool may_go_on = static_cast<double>(search->votes_cast()) < most_votes;
   if (detection->status == verify::Status::rejected && last > all && may_go_on) {
-    ASBUILT_CHECK(propose(last, most_votes, options.detect.last_hypotheses));
+    ASBUILT_CHECK(propose(last, most_votes, options.detect.last_hypotheses, detect::Maxima::many));
     add_candidates(*detection, found.hypotheses);
     judge_all(verify::Look::patient);
     if (!detection) return tl::unexpected(detection.error());

@@ -110,6 +110,7 @@ io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Ve
   record.slip_lead = candidate.slip_lead;
   record.size_hold = candidate.size_hold;
   record.size_lead = candidate.size_lead;
+  record.lost_end_share = candidate.lost_end_share;
   record.overrun_share = candidate.overrun_share;
   record.objection = verify::code_of(candidate.objection);
   return record;

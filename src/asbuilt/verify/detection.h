@@ -50,8 +50,10 @@ struct Candidate {
   int loose_directions = 0;  ///< in which the surface that was found does not hold it
   double size_hold = 0.0;    ///< how well the confirmed surface holds the part's size; see docs
   double size_lead = 0.0;    ///< measurements by which it leads over the part in another size; asked where it does not
-  double overrun_share = 0.0;           ///< share of the model's edges past which the scan's surface simply goes on
-  int explained_samples = 0;            ///< model samples that the scan confirms
+  double lost_end_share =
+      0.0;                     ///< of what was looked at, at an end of unknown place, where nothing came back; see docs
+  double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
+  int explained_samples = 0;   ///< model samples that the scan confirms
   double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does
   bool without_rays = false;            ///< the sensor's place is unknown: what it saw through cannot be asked
   Reason objection = Reason::none;      ///< what stands against it on its own, whatever its rivals

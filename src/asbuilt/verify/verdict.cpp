@@ -39,6 +39,14 @@ double proof_needed(const Candidate& c, const VerifyOptions& options) {
          (c.without_rays ? options.no_rays_surcharge : 0.0);
 }
 
+// The more poses are tried, the sooner one of them passes by chance: of many, one that is not proved far beyond what is
+// asked for may be denied but half as much.
+double contradictions_allowed(const Candidate& c, const VerifyOptions& options) {
+  constexpr double kOfMany = 0.5, kFarBeyond = 1.5;
+  const bool is_doubtful = options.is_one_of_many && proof(c) < kFarBeyond * proof_needed(c, options);
+  return (is_doubtful ? kOfMany : 1.0) * options.max_contradiction_share;
+}
+
 // Where only the edges hold a pose, anything that lies next to them can feign its place: more is asked for than where
 // the surface does, the more so the more ways there are to slip, and less may speak against it. Without rays nothing
 // tells what the sensor looked past, which is most of what an edge can show.
@@ -76,7 +84,7 @@ bool is_a_mere_face(const Candidate& c) {
 
 bool is_held_by_edges(const Candidate& c, const VerifyOptions& options) {
   return !is_a_mere_face(c) && c.slip_lead >= edge_measurements_needed(c, options) &&
-         c.contradiction_share <= 0.75 * options.max_contradiction_share;
+         c.contradiction_share <= 0.75 * contradictions_allowed(c, options);
 }
 
 // Details that break a near-symmetry are few among all samples, so their mean says little; the turn is held if they are
@@ -115,10 +123,11 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         "most {:.2f} is allowed",
                         c.rms_mm, c.residual_ratio, options.max_residual_ratio)};
   }
-  if (!options.paper_mode && c.contradiction_share > options.max_contradiction_share) {
+  const double most_contradictions = contradictions_allowed(c, options);
+  if (!options.paper_mode && c.contradiction_share > most_contradictions) {
     return {Reason::contradicted,
             fmt::format("the scan denies {:.1f} % of the claimed surface, at most {:.1f} % are allowed",
-                        100.0 * c.contradiction_share, 100.0 * options.max_contradiction_share)};
+                        100.0 * c.contradiction_share, 100.0 * most_contradictions)};
   }
   if (!options.paper_mode && c.overrun_share > options.max_overrun_share) {
     return {
@@ -129,8 +138,8 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   }
   // Each share within its limit, but both near it.
   if (!options.paper_mode &&
-      c.contradiction_share * options.max_overrun_share + c.overrun_share * options.max_contradiction_share >
-          options.max_joint_denial * options.max_overrun_share * options.max_contradiction_share) {
+      c.contradiction_share * options.max_overrun_share + c.overrun_share * most_contradictions >
+          options.max_joint_denial * options.max_overrun_share * most_contradictions) {
     return {Reason::contradicted,
             fmt::format("the scan denies {:.1f} % of the claimed surface, and the surface goes on past {:.0f} % of the "
                         "part's edges: each is allowed, but not both",
@@ -155,6 +164,12 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         "held by {:.4f}, {:.4f} needed), and {:.0f} measurements at its edges tell ({:.0f} needed)",
                         c.size_hold, hold_needed(c.missing_share, options), std::max(0.0, c.size_lead),
                         size_measurements_needed(c, options))};
+  }
+  if (!options.paper_mode && c.lost_end_share > options.max_lost_end_share) {
+    return {Reason::under_constrained,
+            fmt::format("where the part should end, nothing came back from {:.1f} % of what was looked at, at most {:.1f} "
+                        "% are allowed: something shorter would look the same",
+                        100.0 * c.lost_end_share, 100.0 * options.max_lost_end_share)};
   }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
@@ -191,7 +206,7 @@ bool is_beyond_doubt(const Candidate& c, const VerifyOptions& options) {
                                       c.size_lead >= kTwice * size_measurements_needed(c, options);
   return objection(c, options).reason == Reason::none && is_held_firmly && is_surely_of_this_size &&
          proof(c) >= proof_needed(c, options) + kProofToSpare &&
-         c.contradiction_share <= kHalf * options.max_contradiction_share &&
+         c.contradiction_share <= kHalf * contradictions_allowed(c, options) &&
          c.overrun_share <= kHalf * options.max_overrun_share;
 }
 

@@ -17,6 +17,7 @@
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/evidence.h"
 #include "asbuilt/verify/lm_icp.h"
+#include "asbuilt/verify/lost_end.h"
 #include "asbuilt/verify/near_poses.h"
 #include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
@@ -103,7 +104,7 @@ std::vector<std::uint8_t> with(std::span<const std::uint8_t> taken, std::vector<
 VerifyOptions limits_of(VerifyOptions options, Look look) {
   constexpr double kOfMany = 0.5;
   if (look != Look::patient) return options;
-  options.max_contradiction_share *= kOfMany;
+  options.is_one_of_many = true;
   options.max_overrun_share *= kOfMany;
   return options;
 }
@@ -114,7 +115,7 @@ std::array<Level, 3> pyramid(const model::PreparedModel& model, Look look, bool 
   const auto most = [&](std::size_t ours) { return paper_mode ? std::numeric_limits<std::size_t>::max() : ours; };
   const double d = model.sampling_distance;
   const std::size_t third = look == Look::quick ? 4 : look == Look::thorough ? 8 : 16;
-  const std::size_t second = 2 * third, first = look == Look::quick ? 16 : 5 * third;
+  const std::size_t second = 2 * third, first = look == Look::quick ? 16 : look == Look::thorough ? 40 : 160;
   const Level coarse{.spacing_mm = 0.8 * d,
                      .robust_scale_mm = {2.0 * d, d},
                      .least_score_distance_mm = 0.5 * d,
@@ -385,6 +386,9 @@ class Judge::Verification {
     if (candidate.size_hold < hold && is_plausible()) {
       candidate.size_lead = size_lead(candidate.model_from_scan, evidence, model_, evidence_, edge_options);
     }
+    if (scan_.viewpoint.known() && candidate.missing_share > options_.max_lost_end_share && is_plausible()) {
+      candidate.lost_end_share = lost_end_share(candidate.model_from_scan, model_, evidence_, options);
+    }
   }
 
   void cut_out(Detection& detection) const {
@@ -621,6 +625,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("near_equal_ratio", near_equal_ratio, 0.0, 0.1));
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_joint_denial", max_joint_denial, 0.0, 2.0));
+  ASBUILT_CHECK(expect_between("max_lost_end_share", max_lost_end_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }

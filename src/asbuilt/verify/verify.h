@@ -41,7 +41,9 @@ struct VerifyOptions {
   double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
       1.0;  ///< contradictions and overrun, each as a share of its limit, together: right poses hardly exceed 0.8
+  double max_lost_end_share = 0.03;    ///< of what was looked at, at an end of unknown place, where nothing came back
   double max_normal_angle_deg = 30.0;  ///< normals closer than this agree
+  bool is_one_of_many = false;         ///< set by a patient look: of so many poses that are tried, more is asked
   bool paper_mode = false;
 
   [[nodiscard]] Result<void> validate() const;
@@ -88,12 +90,15 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
   field("max_overrun_share", options.max_overrun_share, "share of the edges past which the surface may go on");
   field("max_joint_denial", options.max_joint_denial,
         "sum of contradictions and overrun, each as a share of its limit");
+  field("max_lost_end_share", options.max_lost_end_share,
+        "share of the claimed surface that may lie at an end of unknown place and have returned nothing");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 
 /// How many candidates go through the pyramid: a quick look carries at most half as many as a thorough one, a patient
-/// look twice as many. Of the many hypotheses that it is for, one may pass by chance, so it allows only half the
-/// contradictions and the overrun.
+/// look four times as many at first and twice as many in the end. Of the many hypotheses that it is for, one may pass
+/// by chance, so it allows only half the overrun, and half the contradictions of a pose that is not proved far beyond
+/// what is asked for.
 enum class Look { quick, thorough, patient };
 
 /// Judges hypotheses about one scan: coarse-to-fine LM-ICP, score, competition, normals (Sec. 3.1), and cuts the part

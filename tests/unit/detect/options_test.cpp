@@ -19,6 +19,7 @@ TEST(DetectOptions, AsPublishedAreThoseOfThePaper) {
   EXPECT_GT(published.neighbour_bins, 1) << "K > 1";
   EXPECT_EQ(published.bucket_weight_exponent, 1.0) << "p(m, alpha | f) = 1 / N_b";
   EXPECT_EQ(published.peaks_per_reference, 1) << "Eq. 10 has one maximum";
+  EXPECT_EQ(published.last_peaks_per_reference, 1);
   EXPECT_EQ(published.max_hypotheses, 50);
   EXPECT_GE(published.reference_points, 400);
   EXPECT_LE(published.reference_points, 1000);

@@ -55,6 +55,7 @@ TEST(Verdict, GivesEachReasonToTheCandidateThatDeservesIt) {
       {Reason::poor_fit, [](Candidate& c) { c.residual_ratio = 0.55; }},
       {Reason::contradicted, [](Candidate& c) { c.contradiction_share = 0.3; }},
       {Reason::under_constrained, [](Candidate& c) { c.weakest_direction = 0.0; }},
+      {Reason::under_constrained, [](Candidate& c) { c.lost_end_share = 0.2; }},
       {Reason::normals_disagree, [](Candidate& c) { c.normal_agreement = 0.4; }},
       {Reason::weak_evidence,  // 0.75 * 0.78 * (1 - 0.34 / 0.577) = 0.24
        [](Candidate& c) { c.score = 0.75, c.normal_agreement = 0.78, c.residual_ratio = 0.34; }}};
@@ -212,6 +213,20 @@ TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
   EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
   candidate.contradiction_share = 0.0;
   EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+}
+
+TEST(Verdict, OfManyPosesOneThatIsNotProvedFarBeyondMayBeDeniedHalfAsMuch) {
+  VerifyOptions of_many;
+  of_many.is_one_of_many = true;
+  Candidate proved = flawless();  // 0.95 * 0.95 * (1 - 0.15 / 0.577) = 0.67; 1.5 * 0.34 = 0.51 is far beyond
+  proved.contradiction_share = 0.8 * of_many.max_contradiction_share;
+  Candidate doubtful = proved;  // 0.8 * 0.75 * (1 - 0.15 / 0.577) = 0.44
+  doubtful.score = 0.8, doubtful.normal_agreement = 0.75;
+  EXPECT_EQ(decide({proved}, block(), of_many).status, Status::accepted);
+  EXPECT_EQ(decide({doubtful}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({doubtful}, block(), of_many).reason, Reason::contradicted);
+  doubtful.contradiction_share *= 0.5;
+  EXPECT_EQ(decide({doubtful}, block(), of_many).status, Status::accepted);
 }
 
 TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
