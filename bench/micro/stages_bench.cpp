@@ -38,6 +38,14 @@ void BM_DistanceFieldLookup(benchmark::State& state) {
 }
 BENCHMARK(BM_DistanceFieldLookup);
 
+void BM_DistanceFieldDistanceAlone(benchmark::State& state) {
+  const auto points = points_near_surface(4096);
+  std::size_t next = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(scene().model.field->distance_at(points[next++ % points.size()]));
+  state.SetItemsProcessed(state.iterations());
+}
+BENCHMARK(BM_DistanceFieldDistanceAlone);
+
 // What the field saves: the exact search.
 void BM_SurfaceDistanceNearest(benchmark::State& state) {
   const auto points = points_near_surface(4096);

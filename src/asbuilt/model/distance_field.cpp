@@ -131,6 +131,7 @@ Eigen::Vector3d DistanceField::Level::corner_of(std::size_t place) const {
   return origin + kBrickCells * static_cast<double>(voxel) * bricks;
 }
 
+template <bool kDistanceAlone>
 bool DistanceField::Level::sample(const Eigen::Vector3f& point, Sample& result) const {
   const Eigen::Array3f grid = (point - origin_rounded).array() * inverse_voxel;
   if (!((grid >= 0.0F) && (grid < cells)).all()) return false;  // NaN fails here, as it should
@@ -165,6 +166,7 @@ bool DistanceField::Level::sample(const Eigen::Vector3f& point, Sample& result) 
   const float c01 = between(c001, c101, f.x()), c11 = between(c011, c111, f.x());
   const float c0 = between(c00, c10, f.y()), c1 = between(c01, c11, f.y());
   result.distance = between(c0, c1, f.z());
+  if constexpr (kDistanceAlone) return true;
   const float along_x =
       between(between(c100 - c000, c110 - c010, f.y()), between(c101 - c001, c111 - c011, f.y()), f.z());
   const float along_y = between(c10 - c00, c11 - c01, f.z());
@@ -186,9 +188,16 @@ DistanceField::DistanceField(const TriangleMesh& mesh, const SurfaceDistance& su
 
 DistanceField::Sample DistanceField::at(const Eigen::Vector3f& point_in_model) const {
   Sample result{std::numeric_limits<float>::infinity(), Eigen::Vector3f::Zero(), -1};
-  const bool is_near = fine_.sample(point_in_model, result) || coarse_.sample(point_in_model, result);
+  const bool is_near = fine_.sample<false>(point_in_model, result) || coarse_.sample<false>(point_in_model, result);
   static_cast<void>(is_near);  // else the result stays unknown
   return result;
+}
+
+float DistanceField::distance_at(const Eigen::Vector3f& point_in_model) const {
+  Sample result{std::numeric_limits<float>::infinity(), Eigen::Vector3f::Zero(), -1};
+  const bool is_near = fine_.sample<true>(point_in_model, result) || coarse_.sample<true>(point_in_model, result);
+  static_cast<void>(is_near);
+  return result.distance;
 }
 
 std::size_t DistanceField::memory_bytes() const {

@@ -35,6 +35,8 @@ class DistanceField {
                 const Context& context);
 
   [[nodiscard]] Sample at(const Eigen::Vector3f& point_in_model) const;
+  /// at().distance, in two thirds of the time.
+  [[nodiscard]] float distance_at(const Eigen::Vector3f& point_in_model) const;
   [[nodiscard]] double voxel_mm() const { return voxel_mm_; }
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -66,6 +68,7 @@ class DistanceField {
     [[nodiscard]] std::size_t owner_of(const Eigen::Array3i& node, std::size_t place) const;
     [[nodiscard]] Eigen::Vector3d corner_of(std::size_t place) const;
     [[nodiscard]] static std::size_t node_index(const Eigen::Array3i& node);
+    template <bool kDistanceAlone>
     [[nodiscard]] bool sample(const Eigen::Vector3f& point, Sample& result) const;
   };
 

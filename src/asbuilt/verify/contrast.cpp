@@ -60,7 +60,7 @@ class Contrast {
   }
 
   [[nodiscard]] double distance_at(const Eigen::Vector3f& point_in_model) const {
-    return std::abs(static_cast<double>(model_.field->at(point_in_model).distance));
+    return std::abs(static_cast<double>(model_.field->distance_at(point_in_model)));
   }
   [[nodiscard]] double distance_at(const SizedPose& placement, const Eigen::Vector3f& point_in_scan) const {
     return placement.size * distance_at(placement.in_model(point_in_scan.cast<double>()).cast<float>().eval());

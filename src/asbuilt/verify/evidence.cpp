@@ -156,7 +156,7 @@ bool is_flat(const Eigen::Vector3f& on_surface, const Eigen::Vector3f& normal, f
   constexpr float kSag = 0.25F;  // a cylinder of twice the radius is flat enough
   const Eigen::Vector3f u = radius * normal.unitOrthogonal(), v = normal.cross(u);
   for (const Eigen::Vector3f& step : {u, v, Eigen::Vector3f(-u), Eigen::Vector3f(-v)}) {
-    if (!(std::abs(model.field->at(on_surface + step).distance) <= kSag * radius)) return false;
+    if (!(std::abs(model.field->distance_at(on_surface + step)) <= kSag * radius)) return false;
   }
   return true;
 }
@@ -165,7 +165,7 @@ bool is_flat(const Eigen::Vector3f& on_surface, const Eigen::Vector3f& normal, f
 bool is_thin(const Eigen::Vector3f& in_model, const model::DistanceField::Sample& sample, float distance_mm,
              const model::PreparedModel& model) {
   const Eigen::Vector3f& normal = model.face_normals[static_cast<std::size_t>(sample.triangle)];
-  return model.field->at(in_model - (sample.distance + 2.0F * distance_mm) * normal).distance > 0.0F;
+  return model.field->distance_at(in_model - (sample.distance + 2.0F * distance_mm) * normal) > 0.0F;
 }
 
 }  // namespace
@@ -264,7 +264,7 @@ double share_seen_from_behind(const Pose& model_from_scan, std::span<const Eigen
   for (const Eigen::Vector3f& point : points_in_scan) {
     const Eigen::Vector3d in_scan = point.cast<double>();
     const Eigen::Vector3d in_model = model_from_scan * in_scan;
-    if (!(std::abs(model.field->at(in_model.cast<float>()).distance) <= options.distance_mm)) continue;
+    if (!(std::abs(model.field->distance_at(in_model.cast<float>())) <= options.distance_mm)) continue;
     on_model.push_back(in_scan);
     centre += in_scan;
   }

@@ -90,7 +90,7 @@ class NearPoses {
   }
 
   [[nodiscard]] float distance(const Eigen::Vector3f& point_in_model) const {
-    return std::abs(model_.field->at(point_in_model).distance);
+    return std::abs(model_.field->distance_at(point_in_model));
   }
 
   [[nodiscard]] double share_that_stays(const Pose& motion) const {

@@ -41,7 +41,7 @@ std::vector<RimProbe> rim_probes(const model::PreparedModel& model, double reach
       for (int reaches = 1; reaches <= kFarthest; ++reaches) {
         const double way_mm = reaches * reach_mm;
         const Eigen::Vector3f beyond = point + static_cast<float>(way_mm) * along;
-        const auto there = static_cast<double>(model.field->at(beyond).distance);
+        const auto there = static_cast<double>(model.field->distance_at(beyond));
         if (there >= kAway * way_mm) {  // unknown is infinitely far
           probes.push_back({point, normal, beyond, model.is_open()});
           break;

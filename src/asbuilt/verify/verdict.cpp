@@ -280,7 +280,7 @@ double surface_apart_mm(const Pose& a_from_scan, const Pose& b_from_scan, const 
   const Eigen::Isometry3f a_from_b = (a_from_scan * b_from_scan.inverse()).cast<float>();
   float largest = 0.0F;
   for (const Eigen::Vector3f& sample : model.dense_samples.positions) {
-    largest = std::max(largest, std::abs(model.field->at(a_from_b * sample).distance));
+    largest = std::max(largest, std::abs(model.field->distance_at(a_from_b * sample)));
   }
   return static_cast<double>(largest);
 }

@@ -173,7 +173,7 @@ std::vector<Eigen::Vector3f> points_around(const std::vector<Eigen::Vector3f>& p
   std::vector<Eigen::Vector3f> around;
   for (const Eigen::Vector3f& point : points) {
     if ((point - centre).squaredNorm() > radius * radius) continue;
-    if (!(std::abs(model.field->at(rotation * point + translation).distance) <= static_cast<float>(margin_mm)))
+    if (!(std::abs(model.field->distance_at(rotation * point + translation)) <= static_cast<float>(margin_mm)))
       continue;
     around.push_back(point);
     if (around.size() == most) break;

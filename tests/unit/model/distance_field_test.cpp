@@ -50,6 +50,16 @@ TEST(DistanceField, StaysWithinAVoxelOfTheTruthNearTheSurfaceOfASphere) {
   }
 }
 
+TEST(DistanceField, TheDistanceAloneIsThatOfTheWholeSample) {
+  const Part part(test::joined(test::box({0, 0, 0}, {100, 100, 100})), 1.0, 10.0);
+  Random random(5, "alone", 0);
+  for (int i = 0; i < 3000; ++i) {  // near, in the coarse grid, and beyond the reach
+    const Eigen::Vector3f p(static_cast<float>(random.uniform(-30, 130)), static_cast<float>(random.uniform(-30, 130)),
+                            static_cast<float>(random.uniform(-30, 130)));
+    ASSERT_EQ(part.field.distance_at(p), part.field.at(p).distance) << p.transpose();
+  }
+}
+
 TEST(DistanceField, IsUnknownFarAway) {
   const Part part(test::joined(test::box({0, 0, 0}, {10, 10, 10})), 0.5, 3.0);
   for (const Eigen::Vector3f& p :
