@@ -39,28 +39,42 @@ class Closeness {
   double squared_distance_, half_cosine_;
 };
 
-// Of every placement those close to it, itself among them, by increasing index.
-std::vector<std::vector<std::uint32_t>> close_placements(const std::vector<Placement>& placements,
-                                                         const ClusterOptions& options, const Context& context) {
-  std::vector<Eigen::Vector3f> centres;  // from the first one, which keeps them exact enough for the search
-  for (const Placement& placement : placements) {
-    centres.push_back((placement.centre_in_scan - placements.front().centre_in_scan).cast<float>());
-  }
-  const KdTree tree(centres);
-  const Closeness are_close(options);
-  constexpr double kRounding = 1.001;
-  std::vector<std::vector<std::uint32_t>> close(placements.size());
-  parallel_for_blocks(context, placements.size(), 64, [&](std::size_t begin, std::size_t end) {
-    std::vector<KdTree::Neighbour> near;
-    for (std::size_t i = begin; i < end; ++i) {
-      tree.within(centres[i], static_cast<float>(kRounding * options.distance_mm), near);
-      for (const KdTree::Neighbour& other : near) {
-        if (are_close(placements[i], placements[other.index])) close[i].push_back(other.index);
-      }
+// Finds the placements close to one, itself among them, by increasing index.
+class Neighbourhood {
+ public:
+  Neighbourhood(const std::vector<Placement>& placements, const ClusterOptions& options)
+      : placements_(placements),
+        centres_(centres_of(placements)),
+        tree_(centres_),
+        are_close_(options),
+        reach_mm_(static_cast<float>(kRounding * options.distance_mm)) {}
+
+  template <class Visit>
+  void for_each_close(std::size_t i, std::vector<KdTree::Neighbour>& scratch, const Visit& visit) const {
+    tree_.within(centres_[i], reach_mm_, scratch);
+    for (const KdTree::Neighbour& other : scratch) {
+      if (are_close_(placements_[i], placements_[other.index])) visit(other.index);
     }
-  });
-  return close;
-}
+  }
+
+ private:
+  static constexpr double kRounding = 1.001;
+
+  // From the first one, which keeps them exact enough for the search.
+  static std::vector<Eigen::Vector3f> centres_of(const std::vector<Placement>& placements) {
+    std::vector<Eigen::Vector3f> centres;
+    for (const Placement& placement : placements) {
+      centres.push_back((placement.centre_in_scan - placements.front().centre_in_scan).cast<float>());
+    }
+    return centres;
+  }
+
+  const std::vector<Placement>& placements_;
+  std::vector<Eigen::Vector3f> centres_;
+  KdTree tree_;
+  Closeness are_close_;
+  float reach_mm_;
+};
 
 Pose mean_of(std::span<const Placement> members, const Eigen::Vector3d& centre_in_model) {
   Eigen::Vector4d rotation = Eigen::Vector4d::Zero();
@@ -90,13 +104,17 @@ std::vector<Hypothesis> cluster_poses(std::span<const Hypothesis> poses, const E
                                       const ClusterOptions& options, const Context& context) {
   std::vector<Placement> placements;
   for (const Hypothesis& pose : poses) placements.push_back(placement(pose, centre_in_model));
-  const std::vector<std::vector<std::uint32_t>> close = close_placements(placements, options, context);
+  const Neighbourhood near(placements, options);
 
-  // Support of a pose: the votes of all within reach, so that the order of the poses does not shape the clusters.
+  // Support of a pose: the votes of all within reach, so that the order of the poses does not shape the clusters. Who
+  // they are is not kept: along a wall there are thousands for each.
   std::vector<double> support(placements.size());
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    for (const std::uint32_t j : close[i]) support[i] += placements[j].votes;
-  }
+  parallel_for_blocks(context, placements.size(), 64, [&](std::size_t begin, std::size_t end) {
+    std::vector<KdTree::Neighbour> scratch;
+    for (std::size_t i = begin; i < end; ++i) {
+      near.for_each_close(i, scratch, [&](std::uint32_t j) { support[i] += placements[j].votes; });
+    }
+  });
   std::vector<std::uint32_t> order(placements.size());
   std::iota(order.begin(), order.end(), 0U);
   std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
@@ -106,16 +124,17 @@ std::vector<Hypothesis> cluster_poses(std::span<const Hypothesis> poses, const E
   std::vector<Hypothesis> clusters;
   std::vector<std::uint8_t> is_taken(placements.size(), 0);
   std::vector<Placement> members;
+  std::vector<KdTree::Neighbour> scratch;
   for (const std::uint32_t seed : order) {
     if (clusters.size() == static_cast<std::size_t>(options.most)) break;
     if (is_taken[seed] != 0) continue;
     members.assign(1, placements[seed]);
     is_taken[seed] = 1;
-    for (const std::uint32_t i : close[seed]) {
-      if (is_taken[i] != 0) continue;
+    near.for_each_close(seed, scratch, [&](std::uint32_t i) {
+      if (is_taken[i] != 0) return;
       is_taken[i] = 1;
       members.push_back(placements[i]);
-    }
+    });
     double votes = 0.0;
     for (const Placement& member : members) votes += member.votes;
     clusters.push_back({mean_of(members, centre_in_model), votes});
