@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/lost_end.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <ranges>
-#include <vector>
+
+#include "asbuilt/verify/size.h"
 
 namespace asbuilt::verify {
 namespace {
 
-constexpr std::size_t kSlabs = 24;       // across the part's box
-constexpr double kMostlyLost = 0.85;     // of what was looked at in an end that is lost
-constexpr double kHeldByNothing = 1e-3;  // per sample: directions that are held no better are left as they are
-constexpr double kLengthHeld = 1e-4;     // flat faces along an axis hold 1e-5 and less, other surface 2e-4 and more
+constexpr std::size_t kSlabs = 24;    // across the part's box
+constexpr double kMostlyLost = 0.85;  // of what was looked at in an end that is lost
+constexpr double kLengthHeld = 1e-4;  // flat faces along an axis hold 1e-5 and less, other surface 2e-4 and more
 
 /// A part of the model between two planes across an axis, and what became of it.
 struct Slab {
@@ -44,23 +43,17 @@ Slabs slabs_along(int axis, const Pose& model_from_scan, const model::PreparedMo
   return slabs;
 }
 
-// size_hold() of growth along one axis: a slab moves as a whole.
+// The same of growth along one axis as of growth in all: a slab moves as a whole.
 double length_hold(int axis, const Slabs& slabs) {
-  Matrix6d information = Matrix6d::Zero();
-  Vector6d twist_growth = Vector6d::Zero();
-  double growth = 0.0, samples = 0.0;
+  PoseEvidence along;
   for (const Slab& slab : slabs) {
     const Matrix6d& own = slab.evidence.information;
-    information += own;
-    twist_growth += slab.lever * own.col(3 + axis);
-    growth += slab.lever * slab.lever * own(3 + axis, 3 + axis);
-    samples += static_cast<double>(slab.evidence.explained_samples);
+    along.information += own;
+    along.twist_growth += slab.lever * own.col(3 + axis);
+    along.growth += slab.lever * slab.lever * own(3 + axis, 3 + axis);
+    along.explained_samples += slab.evidence.explained_samples;
   }
-  if (samples == 0.0) return 0.0;
-  Matrix6d held = information;
-  held.diagonal().array() += kHeldByNothing * samples;
-  const Vector6d twist = held.ldlt().solve(twist_growth);
-  return std::max(0.0, growth - 2.0 * twist_growth.dot(twist) + twist.dot(information * twist)) / samples;
+  return size_hold(along);
 }
 
 // From the first slab inwards, what was looked at and gave nothing back, for as long as that is nearly all.

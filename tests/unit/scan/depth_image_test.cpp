@@ -71,13 +71,18 @@ TEST(DepthImage, LooksIntoAllSixDirections) {
   }
 }
 
-// Where a front and a back surface both lie around the ray, either may have returned it.
-TEST(DepthImage, IsUndecidedAtTheEdgeOfASurface) {
+// By parallel rays along +z: a surface at 60 where x is negative, one at 100 elsewhere.
+DepthImage of_two_surfaces() {
   std::vector<Eigen::Vector3f> points;
   for (const Eigen::Vector3f& p : test::plane_cloud(80.0, 1.0, 100.0, 0.0, 1).positions) {
     points.emplace_back(p.x(), p.y(), p.x() < 0.0F ? 60.0F : 100.0F);
   }
-  const DepthImage image(points, 1.0, {Viewpoint::Kind::direction, Eigen::Vector3d::UnitZ()});
+  return {points, 1.0, {Viewpoint::Kind::direction, Eigen::Vector3d::UnitZ()}};
+}
+
+// Where a front and a back surface both lie around the ray, either may have returned it.
+TEST(DepthImage, IsUndecidedAtTheEdgeOfASurface) {
+  const DepthImage image = of_two_surfaces();
   EXPECT_EQ(image.evidence({-10, 0, 80}, 2.0), Evidence::hidden);
   EXPECT_EQ(image.evidence({10, 0, 80}, 2.0), Evidence::free);
   EXPECT_EQ(image.evidence({0, 0, 80}, 2.0), Evidence::unknown);
@@ -85,11 +90,7 @@ TEST(DepthImage, IsUndecidedAtTheEdgeOfASurface) {
 
 // What is measured past the edge of a surface in front says nothing about what lies behind that surface.
 TEST(DepthImage, BehindTheEdgeOfSomethingInFrontAllIsHidden) {
-  std::vector<Eigen::Vector3f> points;
-  for (const Eigen::Vector3f& p : test::plane_cloud(80.0, 1.0, 100.0, 0.0, 1).positions) {
-    points.emplace_back(p.x(), p.y(), p.x() < 0.0F ? 60.0F : 100.0F);
-  }
-  const DepthImage image(points, 1.0, {Viewpoint::Kind::direction, Eigen::Vector3d::UnitZ()});
+  const DepthImage image = of_two_surfaces();
   EXPECT_EQ(image.evidence({-1.5, 0, 100}, 2.0), Evidence::hidden);
   EXPECT_EQ(image.evidence({1.5, 0, 100}, 2.0), Evidence::near);
 }
