@@ -6,9 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "asbuilt/core/median.h"
 #include "asbuilt/core/random.h"
 #include "asbuilt/simulate/as_built.h"
 #include "asbuilt/simulate/mesh_edit.h"
+#include "asbuilt/simulate/resting.h"
 #include "asbuilt/simulate/simulate.h"
 
 namespace asbuilt::bench {
@@ -151,6 +153,26 @@ Result<CaseScan> scan_of(const Case& the_case, std::span<const SuitePart> parts,
     result.points_in_scan.positions = std::move(scan.points_in_scan);
     if (the_case.content != Content::part || stratum_of(scan.hidden) == the_case.stratum) break;
   }
+  return result;
+}
+
+CaseScan moved(const CaseScan& scan, std::uint64_t seed) {
+  Random random(seed, "moved", 0);
+  const Eigen::Matrix3d turn = simulate::random_rotation(random);
+  std::vector<float> ranges;
+  for (const Eigen::Vector3f& point : scan.points_in_scan.positions) ranges.push_back(point.norm());
+  const double range_mm = ranges.empty() ? 0.0 : static_cast<double>(median_of(std::move(ranges)));
+  Eigen::Vector3d shift_mm;
+  for (double& axis : shift_mm) axis = random.uniform(-5.0, 5.0) * range_mm;
+  Pose moved_from_scan = Pose::Identity();
+  moved_from_scan.linear() = turn;
+  moved_from_scan.translation() = shift_mm;
+
+  CaseScan result = scan;
+  for (Eigen::Vector3f& point : result.points_in_scan.positions) {
+    point = (moved_from_scan * point.cast<double>()).cast<float>();
+  }
+  if (result.model_from_scan) result.model_from_scan = *result.model_from_scan * moved_from_scan.inverse();
   return result;
 }
 

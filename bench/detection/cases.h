@@ -54,4 +54,8 @@ struct CaseScan {
 /// Simulates the case; where the hidden share misses its stratum, anew with other random numbers, at most five times.
 [[nodiscard]] Result<CaseScan> scan_of(const Case& the_case, std::span<const SuitePart> parts, const Context& context);
 
+/// The same scan in another frame, as exports often are: turned anyhow and shifted by up to five times the sensor's
+/// distance, so that nothing tells where the sensor stood. Follows from the seed.
+[[nodiscard]] CaseScan moved(const CaseScan& scan, std::uint64_t seed);
+
 }  // namespace asbuilt::bench

@@ -76,7 +76,8 @@ Result<void> judge_cases(const Arguments& arguments) {
     ASBUILT_TRY(made, prepared(part, options, context));
     const auto shared = std::make_shared<const PreparedPart>(std::move(made));
     return [&, shared](CaseRecord& record, const CaseScan& scan) {
-      return judge(record, scan, part, *shared, options, context);
+      const bool is_moved = arguments.mode == "moved";
+      return judge(record, is_moved ? moved(scan, record.seed) : scan, part, *shared, options, context);
     };
   };
   return run_cases(arguments.selection, mode_name(arguments), judge_for, context);
@@ -150,8 +151,8 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* cases = app.add_subcommand("cases", "Run cases and append a line for each to OUT/cases.jsonl");
   add_options(*cases, selection);
-  cases->add_option("--mode", arguments.mode, "default, none (no viewpoint) or paper")
-      ->check(CLI::IsMember({"default", "none", "paper"}))
+  cases->add_option("--mode", arguments.mode, "default, moved (to a frame of its own), none (no viewpoint) or paper")
+      ->check(CLI::IsMember({"default", "moved", "none", "paper"}))
       ->capture_default_str();
   cases->add_option("--set", arguments.settings, "NAME=VALUE for any option of the product, for ablations");
   CLI::App* summary = app.add_subcommand("summary", "Figures of OUT/cases.jsonl: summary.json, summary.md, curves");

@@ -72,7 +72,8 @@ Result<void> judge(CaseRecord& record, const CaseScan& scan_of_case, const Suite
     if (staying) {
       for (const std::uint32_t i : *staying) thin.positions.push_back(all.positions[i]);
     }
-    scan = scan::prepare_scan(staying ? thin : all, std::nullopt, viewpoints.of("", ""), options.scan, context);
+    scan =
+        pipeline::prepare_search(staying ? thin : all, all, std::nullopt, viewpoints.of("", ""), options.scan, context);
   }
   if (!scan) return note_failure(record, "unreadable", scan.error().message), Result<void>{};
   if (const auto contradiction = pipeline::size_contradiction(*scan, prepared.model, options)) {

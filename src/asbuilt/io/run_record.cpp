@@ -119,6 +119,7 @@ Json json_of(const ScanRecord& scan) {
           {"points", scan.points},
           {"viewpoint", scan.viewpoint ? json_of(*scan.viewpoint) : Json(nullptr)},
           {"viewpoint_kind", scan.viewpoint_kind},
+          {"viewpoint_source", scan.viewpoint_source},
           {"normals_oriented", scan.normals_oriented},
           {"noise_sigma", json_number(scan.noise_sigma)},
           {"spacing", json_number(scan.spacing)},
@@ -300,6 +301,7 @@ ScanRecord scan_of(const Json& json) {
   scan.points = json.at("points").get<std::uint64_t>();
   if (!json.at("viewpoint").is_null()) scan.viewpoint = vector_of(json.at("viewpoint"));
   scan.viewpoint_kind = json.at("viewpoint_kind").get<std::string>();
+  scan.viewpoint_source = json.value("viewpoint_source", "none");
   scan.normals_oriented = json.at("normals_oriented").get<bool>();
   scan.noise_sigma = number_at(json, "noise_sigma");
   scan.spacing = number_at(json, "spacing");

@@ -76,6 +76,7 @@ struct ScanRecord {
   std::uint64_t points = 0;                 ///< usable ones, after sanitising
   std::optional<Eigen::Vector3d> viewpoint;
   std::string viewpoint_kind = "none";  ///< "point" (a position), "direction" (in which parallel rays fly) or "none"
+  std::string viewpoint_source = "none";  ///< who says so: "stated", "file", "origin", "points" or "none"
   bool normals_oriented = false;
   double noise_sigma = 0.0, spacing = 0.0;
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< taken off inside, already put back in every pose here

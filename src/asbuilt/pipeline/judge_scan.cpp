@@ -30,15 +30,17 @@ scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::S
     request.stated.value = request.stated.value * io::millimetres_per(file.unit) - file.offset_mm;
   }
   // The origin, which `auto` would try, is kilometres away from points that needed an offset.
-  if (!file.offset_mm.isZero(0.0) && !file.viewpoint_mm) request.automatic = false;
+  if (!file.offset_mm.isZero(0.0)) request.may_be_origin = false;
   return request;
 }
 
-Result<scan::Scan> prepared(const io::ScanFile& file, const ScanHalf& half, const Context& context) {
+/// `sought`: the points of the file in which the part is sought, or all.
+Result<scan::Scan> prepared(const io::ScanFile& file, const PointCloud& sought, const ScanHalf& half,
+                            const Context& context) {
   const auto request = local_request(half.viewpoints.of(file.path.string(), file.name), file);
   std::optional<Eigen::Vector3d> file_viewpoint;
   if (file.viewpoint_mm) file_viewpoint = *file.viewpoint_mm - file.offset_mm;
-  auto scan = scan::prepare_scan(file.cloud, file_viewpoint, request, half.options.scan, context);
+  auto scan = prepare_search(sought, file.cloud, file_viewpoint, request, half.options.scan, context);
   if (scan || scan.error().code == ErrorCode::cancelled) return scan;
   return fail(scan.error().code, fmt::format("{}: {}", file.path.string(), scan.error().message));
 }
@@ -66,12 +68,29 @@ double spacing_of_all(const PointCloud& cloud, const Context& context) {
   return median_spacing(measured, KdTree(measured, context));
 }
 
+std::string_view name_of(scan::ViewpointSource source) {
+  switch (source) {
+    case scan::ViewpointSource::none:
+      return "none";
+    case scan::ViewpointSource::stated:
+      return "stated";
+    case scan::ViewpointSource::file:
+      return "file";
+    case scan::ViewpointSource::origin:
+      return "origin";
+    case scan::ViewpointSource::points:
+      return "points";
+  }
+  return "none";
+}
+
 void describe_scan(io::ScanRecord& record, const scan::Scan& scan, const io::ScanFile& file) {
   record.points = file.thinning ? file.thinning->points_in_file : scan.cloud.size();
   record.offset = file.offset_mm;
   record.noise_sigma = scan.noise_sigma_mm;
   record.spacing = scan.spacing_mm;
   record.normals_oriented = scan.normals_oriented;
+  record.viewpoint_source = name_of(scan.viewpoint_source);
   if (scan.viewpoint.kind == scan::Viewpoint::Kind::point) {
     record.viewpoint = scan.viewpoint.value + file.offset_mm;
     record.viewpoint_kind = "point";
@@ -236,7 +255,7 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
   {
     const auto timed = folder.stage("prepare_scan", file.name);
     thin = thinned_for_search(file, half, context);
-    scan = prepared(thin ? *thin : file, half, context);
+    scan = prepared(file, thin ? thin->cloud : file.cloud, half, context);
   }
   if (!scan) return tl::unexpected(scan.error());
   describe_scan(record, *scan, file);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "asbuilt/core/parallel.h"
+#include "asbuilt/core/random.h"
 #include "asbuilt/core/voxel_grid.h"
 
 namespace asbuilt::pipeline {
@@ -106,9 +107,8 @@ std::optional<std::vector<std::uint32_t>> search_points(std::span<const Eigen::V
 
   const VoxelGrid grid{box.min().cast<double>(), cube_mm};
   std::vector<VoxelKey> keys(points.size());
-  parallel_for(context, points.size(), 1 << 14, [&](std::size_t i) {
-    keys[i] = is_measured(points[i]) ? grid.key(points[i].cast<double>()) : kNoCube;
-  });
+  parallel_for(context, points.size(), 1 << 14,
+               [&](std::size_t i) { keys[i] = is_measured(points[i]) ? grid.key(points[i].cast<double>()) : kNoCube; });
   Cubes cubes;
   for (const VoxelKey key : keys) {
     if (key != kNoCube) ++cubes.at(key).points;
@@ -123,6 +123,31 @@ std::optional<std::vector<std::uint32_t>> search_points(std::span<const Eigen::V
   }
   if (staying.size() < kFewest) return std::nullopt;
   return staying;
+}
+
+Result<scan::Scan> prepare_search(const PointCloud& sought, const PointCloud& all,
+                                  const std::optional<Eigen::Vector3d>& file_viewpoint,
+                                  const scan::ViewpointRequest& request, const scan::ScanOptions& options,
+                                  const Context& context) {
+  constexpr std::size_t kDrawn = 150000;
+  auto scan = scan::prepare_scan(sought, file_viewpoint, request, options, context);
+  const bool has_all = sought.size() == all.size();
+  if (!scan || scan->viewpoint.known() || !request.automatic || has_all) return scan;
+  PointCloud draw;
+  Random random(0, "search viewpoint", all.size());
+  const double share = static_cast<double>(kDrawn) / static_cast<double>(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (random.uniform() >= share) continue;
+    draw.positions.push_back(all.positions[i]);
+    if (all.has_normals()) draw.normals.push_back(all.normals[i]);
+  }
+  const auto seen = scan::prepare_scan(draw, std::nullopt, request, options, context);
+  if (!seen || seen->viewpoint_source != scan::ViewpointSource::points) return scan;
+  auto again = scan::prepare_scan(sought, std::nullopt, {false, seen->viewpoint}, options, context);
+  if (!again) return again;
+  again->viewpoint_source = seen->viewpoint_source;
+  again->warnings = seen->warnings;
+  return again;
 }
 
 }  // namespace asbuilt::pipeline

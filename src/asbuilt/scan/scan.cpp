@@ -10,25 +10,62 @@
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
 #include "asbuilt/scan/normals.h"
+#include "asbuilt/scan/point_density.h"
+#include "asbuilt/scan/viewpoint_search.h"
 
 namespace asbuilt::scan {
 namespace {
 
 constexpr std::size_t kFewestPoints = 3;
 
-Viewpoint choose_viewpoint(const Scan& scan, std::span<const Eigen::Vector3f> file_normals,
-                           const std::optional<Eigen::Vector3d>& file_viewpoint, const ViewpointRequest& request,
-                           std::vector<std::string>& warnings) {
-  if (!request.automatic) return request.stated;
-  if (file_viewpoint) return {Viewpoint::Kind::point, *file_viewpoint};
-  const Viewpoint origin{Viewpoint::Kind::point, Eigen::Vector3d::Zero()};
-  if (agrees_with_depth_order(scan.cloud.positions, scan.cloud.normals, file_normals, scan.spacing_mm, origin)) {
-    return origin;
+/// Decides where the sensor stood. `tree` is of the scan's points.
+void choose_viewpoint(Scan& scan, std::span<const Eigen::Vector3f> file_normals,
+                      const std::optional<Eigen::Vector3d>& file_viewpoint, const ViewpointRequest& request,
+                      const KdTree& tree, const Context& context) {
+  const auto take = [&](const Viewpoint& viewpoint, ViewpointSource source) {
+    scan.viewpoint = viewpoint;
+    scan.viewpoint_source = source;
+  };
+  if (!request.automatic) {
+    return take(request.stated, request.stated.known() ? ViewpointSource::stated : ViewpointSource::none);
   }
-  warnings.push_back(
-      "the points are not ordered as a sensor at the scan's origin would see them, so no viewpoint is used; "
-      "state it with --viewpoint");
-  return {};
+  if (file_viewpoint) return take({Viewpoint::Kind::point, *file_viewpoint}, ViewpointSource::file);
+
+  const auto density_of = [&](std::size_t most) {
+    return PointDensity(scan.cloud.positions, scan.cloud.normals, scan.surface_variation, tree, scan.noise_sigma_mm,
+                        most, context);
+  };
+  const auto agrees = [&](const Viewpoint& viewpoint) {
+    return agrees_with_depth_order(scan.cloud.positions, scan.cloud.normals, file_normals, scan.spacing_mm, viewpoint);
+  };
+  // A hall, and a scene seen from behind, are in order from the wrong place, too; the density of their points is not.
+  constexpr std::size_t kFew = 600, kMany = 3000;
+  constexpr double kClearMisfit = 0.2, kClearToEven = 0.7, kClearer = 0.65;
+  const Viewpoint origin{Viewpoint::Kind::point, Eigen::Vector3d::Zero()};
+  const bool may_be_origin = request.may_be_origin && agrees(origin);
+  double misfit_of_origin = 0.0;
+  if (may_be_origin) {
+    const PointDensity density = density_of(kFew);
+    misfit_of_origin = density.misfit(origin.value);
+    const bool is_clear = misfit_of_origin <= std::min(kClearMisfit, kClearToEven * density.misfit_of_even());
+    if (is_clear) return take(origin, ViewpointSource::origin);
+  }
+  if (const auto found = find_viewpoint(scan.cloud.positions, density_of(kMany), scan.noise_sigma_mm, context)) {
+    const Viewpoint viewpoint{Viewpoint::Kind::point, found->position_in_scan};
+    const bool is_clearer = !may_be_origin || found->density_misfit < kClearer * misfit_of_origin;
+    if (is_clearer && agrees(viewpoint)) {
+      scan.warnings.push_back(
+          "the sensor did not stand at the scan's origin; where it stood was found from the points and is known to "
+          "some "
+          "hundredths of the range only: state it with --viewpoint if you know it");
+      return take(viewpoint, ViewpointSource::points);
+    }
+  }
+  if (may_be_origin) return take(origin, ViewpointSource::origin);
+  scan.warnings.push_back(
+      "the points are not ordered as a sensor at the scan's origin would see them, and nothing tells where it stood, "
+      "so "
+      "no viewpoint is used; state it with --viewpoint");
 }
 
 void turn(std::vector<Eigen::Vector3f>& normals, const Context& context, const auto& wanted_direction) {
@@ -86,7 +123,7 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.cloud.normals = std::move(fitted.normals);
   scan.surface_variation = std::move(fitted.variation);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
-  scan.viewpoint = choose_viewpoint(scan, file_normals, file_viewpoint, request, scan.warnings);
+  choose_viewpoint(scan, file_normals, file_viewpoint, request, tree, context);
   scan.spacing_by_range = SpacingByRange(scan.cloud.positions, tree, scan.viewpoint);
   scan.normals_oriented = orient_normals(scan, file_normals, options.use_file_normals, context);
   return scan;

@@ -35,6 +35,7 @@ struct Scan {
   std::vector<float> surface_variation;     ///< of the fit behind each normal: near 0 where flat, large on edges
   std::vector<std::uint32_t> source_index;  ///< row of each point in the file
   Viewpoint viewpoint;
+  ViewpointSource viewpoint_source = ViewpointSource::none;
   bool normals_oriented = false;  ///< whether the sign of the normals means anything
   double spacing_mm = 0.0;        ///< median distance between neighbours
   SpacingByRange spacing_by_range;

@@ -18,11 +18,15 @@ struct Viewpoint {
   [[nodiscard]] Eigen::Vector3d towards_sensor(const Eigen::Vector3d& point_in_scan) const;
 };
 
-/// How the user states it: `automatic` is decided per scan (architecture.md, section 1).
+/// How the user states it: `automatic` is decided per scan (docs/scan.md, section 4).
 struct ViewpointRequest {
   bool automatic = true;
   Viewpoint stated;
+  bool may_be_origin = true;  ///< `automatic` tries the scan's origin
 };
+
+/// Who says where the sensor stood.
+enum class ViewpointSource { none, stated, file, origin, points };
 
 /// Share of the points that, seen from `viewpoint`, hide behind others of the same scan by more than a few
 /// `spacing_mm`. A scan looks single-layered from where it was taken (only edges spill over) and from nowhere else.

@@ -29,6 +29,7 @@ RunRecord example() {
   scan.points = 3'000'000'000ULL;
   scan.viewpoint = Eigen::Vector3d(0.1, -2e9, 1.0 / 3.0);
   scan.viewpoint_kind = "point";
+  scan.viewpoint_source = "points";
   scan.status = ScanStatus::accepted;
   scan.model_from_scan_detected = pose_from_twist((Vector6d() << 0.1, 0.2, 0.3, 1e6 + 0.1, 2, 3).finished());
   scan.model_from_scan = scan.model_from_scan_detected;

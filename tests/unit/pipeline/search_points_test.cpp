@@ -10,7 +10,9 @@
 #include <random>
 #include <tuple>
 
+#include "asbuilt/core/voxel_grid.h"
 #include "unit/detect/oriented_points.h"
+#include "unit/scan/camera.h"
 
 namespace asbuilt::pipeline {
 namespace {
@@ -109,6 +111,29 @@ TEST(SearchPoints, AreAllInPaperModeAndWhenTheOptionsSaySo) {
   detect::DetectOptions never;
   never.search_spacing_ratio = 0.0;
   EXPECT_FALSE(search_points(points, model(), never, Context(2)).has_value());
+}
+
+// What is sought in is as dense everywhere, which hides where the camera stood; all points together tell it.
+TEST(PrepareSearch, LooksForTheViewpointInAllPoints) {
+  const Eigen::Vector3d camera(-40, 30, 0);
+  const Pose motion =
+      Eigen::Translation3d(900, -2500, 400) * Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized());
+  PointCloud all, sought;
+  for (const Eigen::Vector3f& point : test::seen_by_camera(camera, 400)) {
+    all.positions.push_back((motion * point.cast<double>()).cast<float>());
+  }
+  for (const std::uint32_t i : even_subset(all.positions, 9.0, Context(2)))
+    sought.positions.push_back(all.positions[i]);
+  ASSERT_FALSE(scan::prepare_scan(sought, std::nullopt, {}, {}, Context(2)).value().viewpoint.known());
+
+  const scan::Scan scan = prepare_search(sought, all, std::nullopt, {}, {}, Context(2)).value();
+  EXPECT_EQ(scan.cloud.size(), sought.size());
+  EXPECT_EQ(scan.viewpoint_source, scan::ViewpointSource::points);
+  EXPECT_LT((scan.viewpoint.value - motion * camera).norm(), 0.15 * test::kBall.z());
+  EXPECT_TRUE(scan.normals_oriented);
+
+  const scan::ViewpointRequest nothing{false, {}};
+  EXPECT_FALSE(prepare_search(sought, all, std::nullopt, nothing, {}, Context(2)).value().viewpoint.known());
 }
 
 }  // namespace
