@@ -12,6 +12,7 @@
 #include "asbuilt/refine/model_turn.h"
 #include "asbuilt/refine/symmetry_choice.h"
 #include "asbuilt/refine/view_difference.h"
+#include "asbuilt/verify/near_poses.h"
 
 namespace asbuilt::pipeline {
 namespace {
@@ -83,12 +84,12 @@ void say_that_nothing_tells(const RefinedComponent& component, std::size_t place
 
 }  // namespace
 
-Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& model, io::RunRecord& record,
-                          const Context& context) {
+Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& model, double near_equal_ratio,
+                          io::RunRecord& record, const Context& context) {
   const model::SymmetryGroup& symmetry = model.prepared.symmetry;
   using Kind = model::SymmetryGroup::Kind;
   const bool is_round = symmetry.kind == Kind::revolution || symmetry.kind == Kind::sphere;
-  if (symmetry.near_axes.empty() || is_round || scans.size() < 2) return {};
+  if (is_round || scans.size() < 2 || !verify::turns_are_nearly_equal(model.prepared, near_equal_ratio)) return {};
   const refine::TurnAxis axis = turn_axis(symmetry);
   std::vector<std::size_t> untold;
   for (std::size_t s = 0; s < scans.size(); ++s) {
