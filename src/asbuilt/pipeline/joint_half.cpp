@@ -72,7 +72,10 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
                     io::RunRecord& record, const Context& context) {
   constexpr int kMostRounds = 3;
   std::vector<PosedScan>& scans = registration.scans;
-  if (!options.paper_mode) ASBUILT_CHECK(start_as_detected(scans, model, context));
+  if (!options.paper_mode) {
+    ASBUILT_CHECK(choose_turns(scans, model, options.verify.near_equal_ratio, record, context));
+    ASBUILT_CHECK(start_as_detected(scans, model, context));
+  }
   ASBUILT_TRY(first_graph, linked(scans, model, options, folder, context));
   registration.graph = std::move(first_graph);
   bool placements_chosen = options.paper_mode;

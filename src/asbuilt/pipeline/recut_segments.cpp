@@ -44,13 +44,14 @@ void keep_only_detected(Segment& segment) {
   for (std::size_t i = 0; i < segment.is_part.size(); ++i) segment.is_part[i] &= segment.was_part_detected[i];
 }
 
-fuse::PosedSegment part_of(const Segment& segment, const PosedScan& scan) {
+/// `left_out`: one byte a point, or empty.
+fuse::PosedSegment part_of(const Segment& segment, const std::vector<std::uint8_t>& left_out, const PosedScan& scan) {
   fuse::PosedSegment part;
   part.model_from_scan = scan.model_from_local;
   part.noise_sigma_mm = scan.noise_sigma_mm;
   part.scan_index = scan.index;  // the spacing is measured: a hall has another than the part in it
   for (std::size_t i = 0; i < segment.is_part.size(); ++i) {
-    if (segment.is_part[i] == 0) continue;
+    if (segment.is_part[i] == 0 || (!left_out.empty() && left_out[i] != 0)) continue;
     part.segment_in_scan.positions.push_back(segment.cloud.positions[i]);
     part.segment_in_scan.normals.push_back(segment.cloud.normals[i]);
     if (!segment.colours.empty()) part.colours.push_back(segment.colours[i]);
@@ -74,22 +75,22 @@ Result<std::vector<fuse::PosedSegment>> recut_segments(const RefinedComponent& c
         {std::move(segment.cloud), segment.is_part, scan.model_from_local, scan.noise_sigma_mm, scan.viewpoint});
     segments.push_back(std::move(segment));
   }
-  std::vector<std::vector<std::uint8_t>> flags;
+  std::vector<fuse::RecutSegment> cut(segments.size());
   if (!options.paper_mode) {
-    ASBUILT_TRY(cut, fuse::recut(seen, context));
-    flags = std::move(cut);
+    ASBUILT_TRY(cut_anew, fuse::recut(seen, context));
+    cut = std::move(cut_anew);
   }
   std::vector<fuse::PosedSegment> parts;
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const PosedScan& scan = scans[static_cast<std::size_t>(component.members[i])];
     Segment& segment = segments[i];
     segment.cloud = std::move(seen[i].cloud_in_scan);
-    if (!flags.empty()) {
-      segment.is_part = std::move(flags[i]);
+    if (!options.paper_mode) {
+      segment.is_part = std::move(cut[i].is_part);
       if (record_of(scan, record).instances_in_scan > 1) keep_only_detected(segment);
       ASBUILT_CHECK(write_segment(file_of(scan, record, folder), segment, record_of(scan, record).offset));
     }
-    parts.push_back(part_of(segment, scan));
+    parts.push_back(part_of(segment, cut[i].in_doubt, scan));
     segment = {};
   }
   return parts;

@@ -4,11 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <string>
 #include <string_view>
 
+#include "asbuilt/refine/model_turn.h"
 #include "asbuilt/refine/symmetry_choice.h"
 #include "asbuilt/refine/view_difference.h"
+#include "asbuilt/verify/near_poses.h"
 
 namespace asbuilt::pipeline {
 namespace {
@@ -44,15 +48,22 @@ bool are_held(const RefinedComponent& component, double diameter_mm) {
   });
 }
 
-void leave_out(const PosedScan& scan, std::size_t placements, io::RunRecord& record, const Context& context) {
+void leave_out(const PosedScan& scan, std::string reason, io::RunRecord& record, const Context& context) {
   io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
   entry.status = io::ScanStatus::ambiguous;
   entry.reason_code = "symmetry";
-  entry.reason = fmt::format(
-      "the part has {} placements that its CAD does not tell apart; other scans show what was built differently, this "
-      "one does not show where it belongs",
-      placements);
+  entry.reason = std::move(reason);
   context.warn(fmt::format("{}: ambiguous: {}", entry.path, entry.reason));
+}
+
+// The axis of near-symmetry that most of the surface goes round, with the smallest turn of the part's own group about
+// it.
+refine::TurnAxis turn_axis(const model::SymmetryGroup& symmetry) {
+  constexpr double kSameAxis = 0.999;
+  const model::NearAxis& near = symmetry.near_axes.front();
+  const bool has_turns = symmetry.kind == model::SymmetryGroup::Kind::discrete && symmetry.order > 1 &&
+                         std::abs(near.axis.dot(symmetry.axis)) > kSameAxis;
+  return {near.axis, near.point, 2.0 * std::numbers::pi / (has_turns ? symmetry.order : 1)};
 }
 
 // `why` ends the sentence that no scan tells the placements apart.
@@ -72,6 +83,48 @@ void say_that_nothing_tells(const RefinedComponent& component, std::size_t place
 }
 
 }  // namespace
+
+Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& model, double near_equal_ratio,
+                          io::RunRecord& record, const Context& context) {
+  const model::SymmetryGroup& symmetry = model.prepared.symmetry;
+  using Kind = model::SymmetryGroup::Kind;
+  const bool is_round = symmetry.kind == Kind::revolution || symmetry.kind == Kind::sphere;
+  if (is_round || scans.size() < 2 || !verify::turns_are_nearly_equal(model.prepared, near_equal_ratio)) return {};
+  const refine::TurnAxis axis = turn_axis(symmetry);
+  std::vector<std::size_t> untold;
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    PosedScan& scan = scans[s];
+    if (record.scans[static_cast<std::size_t>(scan.index)].reason_code == "accepted_by_user") continue;
+    const refine::View view{scan.part, scan.model_from_local_detected, scan.noise_sigma_mm, scan.viewpoint};
+    ASBUILT_TRY(turn, refine::turn_on_model(view, *model.prepared.surface, model.prepared.diameter, axis, context));
+    if (!turn.is_told) {
+      untold.push_back(s);
+    } else if (turn.angle_rad != 0.0) {
+      scan.model_from_local_detected = orthonormalised(
+          model::rotation_about(axis.direction, axis.point, turn.angle_rad) * scan.model_from_local_detected);
+    }
+  }
+  if (untold.empty()) return {};
+  if (untold.size() + 2 > scans.size()) {
+    for (const PosedScan& scan : scans) {
+      io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
+      if (!entry.reason_code.empty()) continue;
+      entry.reason_code = "symmetry";
+      entry.reason = "the part looks nearly the same at any turn about its axis, and the scans do not show theirs";
+    }
+    context.warn(
+        "the part looks nearly the same at any turn about its axis, and the scans do not show theirs: how they are "
+        "turned against one another is not known");
+    return {};
+  }
+  for (auto s = untold.rbegin(); s != untold.rend(); ++s) {
+    leave_out(scans[*s],
+              "the part looks nearly the same at any turn about its axis; other scans show theirs, this one does not",
+              record, context);
+    scans.erase(scans.begin() + static_cast<std::ptrdiff_t>(*s));
+  }
+  return {};
+}
 
 Result<bool> choose_placements(const RefinedComponent& component, std::vector<PosedScan>& scans,
                                const LoadedModel& model, io::RunRecord& record, const Context& context) {
@@ -107,7 +160,12 @@ Result<bool> choose_placements(const RefinedComponent& component, std::vector<Po
   }
   std::ranges::sort(undecided, std::ranges::greater{});
   for (const int member : undecided) {
-    leave_out(scans[static_cast<std::size_t>(member)], symmetry.elements.size(), record, context);
+    leave_out(
+        scans[static_cast<std::size_t>(member)],
+        fmt::format("the part has {} placements that its CAD does not tell apart; other scans show what was built "
+                    "differently, this one does not show where it belongs",
+                    symmetry.elements.size()),
+        record, context);
     scans.erase(scans.begin() + member);
   }
   return changed || !undecided.empty();

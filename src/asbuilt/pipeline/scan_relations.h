@@ -11,6 +11,15 @@
 
 namespace asbuilt::pipeline {
 
+/// For a part that any turn about an axis leaves within `near_equal_ratio` of the diameter of itself (a rotor with low
+/// ribs), so that verification accepts a scan without its turn (verify::turns_are_nearly_equal): gives each scan the
+/// turn at which it meets the CAD (refine::turn_on_model), before scans that stand between draw others off theirs.
+/// Detected poses change with it. If at least two scans show theirs, those that do not are taken out of `scans` and
+/// become ambiguous
+/// (`symmetry`) in the record; else all stay and the record says so. Errors: cancelled.
+[[nodiscard]] Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& model,
+                                        double near_equal_ratio, io::RunRecord& record, const Context& context);
+
 /// For a part with a finite symmetry group: gives each scan of a refined component the placement that what was built
 /// tells (refine::choose_elements); detected and starting poses change with it. Scans for which nothing tells are taken
 /// out of `scans` and become ambiguous (`symmetry`) in the record. If nothing tells for any scan, all placements show

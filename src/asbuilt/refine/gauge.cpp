@@ -22,6 +22,7 @@ constexpr double kRoughReachRatio = 0.15;  // a start 6 degrees and 5 % off leav
 constexpr std::size_t kRoughPoints = 2000;
 constexpr double kRoughOffRatio = 0.01;  // of the diameter: further off than parts deviate from their CAD ...
 constexpr double kRoughShare = 0.1;      // ... if it is more of the points than a few dents explain
+constexpr double kRoughTurn = 0.1, kRoughShiftRatio = 0.05;  // radians, of the diameter: from there a fit begins, too
 constexpr double kTukeyTuning = 4.685;
 constexpr double kScaleDecay = 0.5;   // of the loss from step to step, at most
 constexpr double kSameSide = 0.3;     // cosine between scan normal and surface normal
@@ -83,7 +84,9 @@ class GaugeFit {
     length_ = std::max(std::sqrt(squares / static_cast<double>(points.size())), 1e-9 * diameter);
   }
 
-  Result<Pose> run() {
+  // From `start`, a motion of the points as they are given.
+  Result<Pose> run(const Pose& start = Pose::Identity()) {
+    pose_ = start;
     double scale = reach_;
     double damping = 1e-6;
     std::vector<Residual> residuals = residuals_at(pose_);
@@ -125,6 +128,18 @@ class GaugeFit {
       off += residual.used && std::abs(residual.distance) <= kRoughOffRatio * diameter_ ? 0 : 1;
     }
     return static_cast<double>(off) / static_cast<double>(points_.size());
+  }
+
+  // Turned and shifted both ways about and along three axes through the middle of the points.
+  [[nodiscard]] std::vector<Pose> starts_around() const {
+    std::vector<Pose> starts;
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      for (const double sign : {1.0, -1.0}) {
+        const double by = i < 3 ? kRoughTurn * length_ : kRoughShiftRatio * diameter_;
+        starts.push_back(moved(sign * by * Vector6d::Unit(i)));
+      }
+    }
+    return starts;
   }
 
  private:
@@ -237,10 +252,22 @@ Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& su
   GaugeFit fit(points, surface, diameter_mm, kRoughReachRatio, context);
   const double before = fit.share_off(Pose::Identity());
   if (before <= kRoughShare) return view.model_from_scan;
-  const auto motion = fit.run();
-  if (!motion && motion.error().code == ErrorCode::cancelled) return motion;
-  if (!motion || fit.share_off(*motion) > 0.5 * before) return view.model_from_scan;  // no better there
-  return orthonormalised(*motion * view.model_from_scan);
+  std::vector<Pose> starts = fit.starts_around();
+  starts.insert(starts.begin(), Pose::Identity());
+  Pose best = Pose::Identity();
+  double least = before;
+  for (const Pose& start : starts) {
+    const auto motion = fit.run(start);
+    if (!motion && motion.error().code == ErrorCode::cancelled) return motion;
+    if (!motion) continue;
+    const double left = fit.share_off(*motion);
+    if (left >= least) continue;
+    least = left;
+    best = *motion;
+    if (least <= kRoughShare) break;  // on the CAD: the others can only find the same place
+  }
+  if (least > 0.5 * before) return view.model_from_scan;  // no better there
+  return orthonormalised(best * view.model_from_scan);
 }
 
 }  // namespace asbuilt::refine

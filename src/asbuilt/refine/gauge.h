@@ -27,9 +27,9 @@ namespace asbuilt::refine {
 
 /// Where the joint refinement shall begin with this view: its own pose, or, if more than a tenth of its points lie
 /// further off the CAD than parts deviate from theirs (1 % of the diameter), that pose fitted to the CAD, provided that
-/// this halves their share. Scan against scan, a start that is 6 degrees off finds too little in common; scan against
-/// CAD, nothing is missing. Found poses have been fitted before and stay as they are, to the bit.
-/// Errors: invalid_argument (no normals, no diameter), cancelled.
+/// this halves their share. A fit that ends elsewhere is begun anew from 12 starts around. Scan against scan, a start
+/// that is 6 degrees off finds too little in common; scan against CAD, nothing is missing. Found poses have been fitted
+/// before and stay as they are, to the bit. Errors: invalid_argument (no normals, no diameter), cancelled.
 [[nodiscard]] Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,
                                             const Context& context);
 

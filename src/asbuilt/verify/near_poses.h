@@ -34,4 +34,8 @@ namespace asbuilt::verify {
 /// `near_too`, those about axes of near-symmetry.
 [[nodiscard]] double weakest_direction(const PoseEvidence& evidence, const model::PreparedModel& model, bool near_too);
 
+/// Whether every turn about an axis of near-symmetry leaves all of the surface within `ratio` of the diameter of
+/// itself: then a scan may be accepted without showing its turn. False where there is no such axis.
+[[nodiscard]] bool turns_are_nearly_equal(const model::PreparedModel& model, double ratio);
+
 }  // namespace asbuilt::verify

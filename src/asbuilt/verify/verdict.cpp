@@ -8,6 +8,8 @@
 #include <numbers>
 #include <optional>
 
+#include "asbuilt/verify/near_poses.h"
+
 namespace asbuilt::verify {
 namespace {
 
@@ -329,19 +331,6 @@ bool is_loose_in_turn_only(Candidate c, const VerifyOptions& options) {
   return objection(c, options).reason == Reason::none;
 }
 
-// Whether every turn about an axis of near-symmetry leaves the surface nearly where it is.
-bool turns_are_nearly_equal(const Candidate& c, const model::PreparedModel& model, const VerifyOptions& options) {
-  constexpr int kTurns = 7;
-  constexpr double kGolden = 0.381966011250105;  // of a turn, so that no order of a symmetry divides them all
-  for (const model::NearAxis& axis : model.symmetry.near_axes) {
-    for (int i = 1; i <= kTurns; ++i) {
-      const Pose turn = model::rotation_about(axis.axis, axis.point, 2.0 * std::numbers::pi * kGolden * i);
-      if (!are_nearly_equal(c.model_from_scan, turn * c.model_from_scan, model, options)) return false;
-    }
-  }
-  return !model.symmetry.near_axes.empty();
-}
-
 std::string acceptance(const Candidate& best, const model::PreparedModel& model, const VerifyOptions& options) {
   const std::string found = fmt::format("{:.0f} % of what should be visible was found, {:.0f} % of the normals agree",
                                         100.0 * best.score, 100.0 * best.normal_agreement);
@@ -462,7 +451,7 @@ Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& 
   Finding finding = objection(detection.best, options);
   const bool turn_is_unknown =
       finding.reason == Reason::under_constrained && is_loose_in_turn_only(detection.best, options);
-  if (turn_is_unknown && !turns_are_nearly_equal(detection.best, model, options)) {
+  if (turn_is_unknown && !turns_are_nearly_equal(model, options.near_equal_ratio)) {
     detection.status = Status::ambiguous;
     detection.reason = Reason::ambiguous_pose;
     detection.explanation =

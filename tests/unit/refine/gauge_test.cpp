@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
 
 #include "property/refine/bumpy_body.h"
@@ -222,6 +223,48 @@ TEST(StartNearModel, BringsAStartThatIsSixDegreesAndFivePercentOffToTheCad) {
     const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
     EXPECT_LT(worst_displacement(mesh, start), 0.1) << "seed " << seed;  // two sigma; the start was 8 to 12 mm off
   }
+}
+
+// Four bars, 400 x 300 x 300 mm over all and 12 mm thick: one that starts off its place finds the wrong side of itself.
+TriangleMesh open_frame() {
+  using V = Eigen::Vector3d;
+  TriangleMesh mesh;
+  const auto bar = [&](const V& low, const V& high) {
+    const auto corner = [&](int i) {
+      return V((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(), (i & 4) != 0 ? high.z() : low.z());
+    };
+    const int at = static_cast<int>(mesh.vertices.size());
+    for (int i = 0; i < 8; ++i) mesh.vertices.push_back(corner(i));
+    for (const auto& [a, b, c, d] : {std::array{0, 2, 3, 1}, std::array{4, 5, 7, 6}, std::array{0, 1, 5, 4},
+                                     std::array{2, 6, 7, 3}, std::array{0, 4, 6, 2}, std::array{1, 3, 7, 5}}) {
+      mesh.triangles.emplace_back(at + a, at + b, at + c);
+      mesh.triangles.emplace_back(at + a, at + c, at + d);
+    }
+  };
+  bar(V(0, 0, 0), V(400, 12, 12));
+  bar(V(0, 12, 0), V(12, 300, 12));
+  bar(V(388, 12, 0), V(400, 200, 12));
+  bar(V(0, 0, 12), V(12, 12, 300));
+  return mesh;
+}
+
+TEST(StartNearModel, BeginsAnewWhereOneFitEndsElsewhere) {
+  const TriangleMesh mesh = open_frame();
+  const model::SurfaceDistance surface(mesh);
+  const Eigen::Vector3d middle(200.0, 150.0, 150.0);
+  View view = seen_from_above(mesh);
+  int found = 0;
+  constexpr int kStarts = 20;
+  for (std::uint64_t seed = 0; seed < kStarts; ++seed) {
+    Random random(seed, "rough start", 0);
+    const Eigen::Vector3d shift = 0.05 * diameter(mesh) * test::random_direction(random);
+    view.model_from_scan = Eigen::Translation3d(middle + shift) *
+                           Eigen::AngleAxisd(6.0 * 3.14159265358979 / 180.0, test::random_direction(random)) *
+                           Eigen::Translation3d(-middle);
+    const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
+    found += worst_displacement(mesh, start) < 0.3 ? 1 : 0;
+  }
+  EXPECT_GE(found, 19);  // with one fit alone 17
 }
 
 TEST(StartNearModel, LeavesAPoseAloneThatDeviatesAsPartsDo) {

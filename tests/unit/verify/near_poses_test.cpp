@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "asbuilt/verify/verdict.h"
 #include "unit/verify/seen.h"
@@ -66,6 +68,36 @@ TEST(TurnedInBox, OfAnAngleHalfSeenIsTheOtherLeg) {
     });
     EXPECT_GE(static_cast<double>(on_model), 0.75 * static_cast<double>(seen.size()));
   }
+}
+
+// A drum, 80 mm across and 90 mm high, with five ribs 6 mm wide along its side.
+TriangleMesh ribbed_drum(double rib_height) {
+  constexpr int kSides = 240;
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {0, 0, 90}};
+  for (int i = 0; i < kSides; ++i) {
+    const double angle = 2.0 * kPi * i / kSides, from_rib = 40.0 * std::remainder(angle, 2.0 * kPi / 5.0);
+    const double radius = 40.0 + (std::abs(from_rib) < 3.0 ? rib_height : 0.0);
+    for (const double z : {0.0, 90.0})
+      mesh.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+  }
+  for (int i = 0; i < kSides; ++i) {
+    const int a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % kSides);
+    for (const auto& [u, v, w] :
+         {std::tuple(a, b, b + 1), std::tuple(a, b + 1, a + 1), std::tuple(0, b, a), std::tuple(1, a + 1, b + 1)}) {
+      mesh.triangles.emplace_back(u, v, w);
+    }
+  }
+  return mesh;
+}
+
+TEST(TurnsAreNearlyEqual, OfADrumWithLowRibsButNotWithHighOnes) {
+  const model::PreparedModel low = test::prepared(ribbed_drum(1.0), 0.04);  // 0.8 % of the diameter
+  ASSERT_FALSE(low.symmetry.near_axes.empty()) << low.symmetry.describe();
+  EXPECT_TRUE(turns_are_nearly_equal(low, 0.01));
+  EXPECT_FALSE(turns_are_nearly_equal(low, 0.004));
+  EXPECT_FALSE(turns_are_nearly_equal(test::prepared(ribbed_drum(4.0), 0.04), 0.01));
+  EXPECT_FALSE(turns_are_nearly_equal(test::prepared(test::stepped_block(), 0.05), 0.01));  // has no such axis
 }
 
 PoseEvidence evidence_of(const scan::Scan& scan, const Pose& pose, const model::PreparedModel& model) {
