@@ -18,6 +18,15 @@ namespace {
 
 constexpr std::size_t kFewestPoints = 3;
 
+// Whether a found viewpoint is to be believed, and not an origin that is possible by the depth order. A cloud that was
+// thinned has lost its density, but not what hides behind what.
+bool is_clearer_than_rival(const FoundViewpoint& found, double misfit_of_rival) {
+  constexpr double kClearer = 0.65, kMuchMore = 5.0;
+  if (found.density_misfit > kClearer * misfit_of_rival) return false;
+  return found.shadows_of_rival.hidden > kMuchMore * found.shadows.hidden ||
+         found.shadows_of_rival.misfit() > kMuchMore * found.shadows.misfit();
+}
+
 /// Decides where the sensor stood. `tree` is of the scan's points.
 void choose_viewpoint(Scan& scan, std::span<const Eigen::Vector3f> file_normals,
                       const std::optional<Eigen::Vector3d>& file_viewpoint, const ViewpointRequest& request,
@@ -40,7 +49,7 @@ void choose_viewpoint(Scan& scan, std::span<const Eigen::Vector3f> file_normals,
   };
   // A hall, and a scene seen from behind, are in order from the wrong place, too; the density of their points is not.
   constexpr std::size_t kFew = 600, kMany = 3000;
-  constexpr double kClearMisfit = 0.2, kClearToEven = 0.7, kClearer = 0.65;
+  constexpr double kClearMisfit = 0.2, kClearToEven = 0.7;
   const Viewpoint origin{Viewpoint::Kind::point, Eigen::Vector3d::Zero()};
   const bool may_be_origin = request.may_be_origin && agrees(origin);
   double misfit_of_origin = 0.0;
@@ -50,10 +59,11 @@ void choose_viewpoint(Scan& scan, std::span<const Eigen::Vector3f> file_normals,
     const bool is_clear = misfit_of_origin <= std::min(kClearMisfit, kClearToEven * density.misfit_of_even());
     if (is_clear) return take(origin, ViewpointSource::origin);
   }
-  if (const auto found = find_viewpoint(scan.cloud.positions, density_of(kMany), scan.noise_sigma_mm, context)) {
+  const auto found =
+      find_viewpoint(scan.cloud.positions, density_of(kMany), scan.noise_sigma_mm, origin.value, context);
+  if (found && (!may_be_origin || is_clearer_than_rival(*found, misfit_of_origin))) {
     const Viewpoint viewpoint{Viewpoint::Kind::point, found->position_in_scan};
-    const bool is_clearer = !may_be_origin || found->density_misfit < kClearer * misfit_of_origin;
-    if (is_clearer && agrees(viewpoint)) {
+    if (agrees(viewpoint)) {
       scan.warnings.push_back(
           "the sensor did not stand at the scan's origin; where it stood was found from the points and is known to "
           "some "

@@ -20,12 +20,12 @@ using Position = Eigen::Vector3d;
 
 struct Sharpened {
   Position from;
-  Shadows shadows;
+  Shadows shadows, shadows_of_rival;
 };
 
 // Moves the viewpoint along the line of sight and across it, in ever smaller steps, while the shadows fit better.
 Sharpened sharpened(std::span<const Eigen::Vector3f> points, const PointDensity::Fit& fit, double noise_sigma_mm,
-                    const Context& context) {
+                    const std::optional<Position>& rival, const Context& context) {
   constexpr double kCellInSteps = 1.5;  // of the sensor's angle: on a continuous surface hardly a cell is empty
   constexpr double kJumpInSteps = 6.0, kJumpInSigmas = 6.0;
   constexpr double kFirstStep = 0.03, kLastStep = 0.001, kFarthest = 0.25;  // of the range
@@ -45,7 +45,7 @@ Sharpened sharpened(std::span<const Eigen::Vector3f> points, const PointDensity:
   axes.col(2) = axes.col(0).cross(axes.col(1));
 
   std::vector<ShadowImage> images(6, ShadowImage(points));
-  Sharpened best{fit.position_in_scan, images[0].seen_from(fit.position_in_scan, cell, jump)};
+  Sharpened best{fit.position_in_scan, images[0].seen_from(fit.position_in_scan, cell, jump), {}};
   std::array<Sharpened, 6> tried;
   for (double step = kFirstStep * range; step > kLastStep * range;) {
     parallel_for(context, tried.size(), 1, [&](std::size_t t) {
@@ -61,6 +61,7 @@ Sharpened sharpened(std::span<const Eigen::Vector3f> points, const PointDensity:
       step *= 0.5;
     }
   }
+  if (rival) best.shadows_of_rival = images[0].seen_from(*rival, cell, jump);
   return best;
 }
 
@@ -78,24 +79,23 @@ std::vector<Eigen::Vector3f> drawn(std::span<const Eigen::Vector3f> points, std:
 }  // namespace
 
 std::optional<FoundViewpoint> find_viewpoint(std::span<const Eigen::Vector3f> points, const PointDensity& density,
-                                             double noise_sigma_mm, const Context& context) {
+                                             double noise_sigma_mm, const std::optional<Position>& rival_in_scan,
+                                             const Context& context) {
   constexpr std::size_t kMostImagePoints = 400000;
   // Of scans with a known viewpoint, and of merged and thinned clouds; docs/scan.md, section 4.
-  constexpr double kMostMisfit = 0.25, kMostMisfitToEven = 0.7, kMostHidden = 0.05;
+  constexpr double kMostMisfit = 0.2, kMostMisfitToEven = 0.6, kMostHidden = 0.05;
   const double most_misfit = std::min(kMostMisfit, kMostMisfitToEven * density.misfit_of_even());
   const std::vector<Eigen::Vector3f> seen = drawn(points, kMostImagePoints);
   const double log_thinning = std::log(static_cast<double>(points.size()) / static_cast<double>(seen.size()));
   std::optional<FoundViewpoint> best;
-  double least = std::numeric_limits<double>::infinity();
   for (PointDensity::Fit fit : density.fits(context)) {
     if (fit.misfit > most_misfit) continue;
     fit.log_rate -= log_thinning;
-    const Sharpened sharp = sharpened(seen, fit, noise_sigma_mm, context);
-    if (sharp.shadows.misfit() >= least) continue;
-    least = sharp.shadows.misfit();
-    best = {sharp.from, fit.misfit, sharp.shadows.hidden, sharp.shadows.gaps};
+    const Sharpened sharp = sharpened(seen, fit, noise_sigma_mm, rival_in_scan, context);
+    if (best && sharp.shadows.misfit() >= best->shadows.misfit()) continue;
+    best = {sharp.from, fit.misfit, sharp.shadows, sharp.shadows_of_rival};
   }
-  if (best && best->hidden_share > kMostHidden) return std::nullopt;
+  if (best && best->shadows.hidden > kMostHidden) return std::nullopt;
   return best;
 }
 

@@ -58,12 +58,21 @@ TEST(ViewpointSearch, FindsNothingInAMergedCloud) {
     const auto more = test::seen_by_camera(other);
     merged.insert(merged.end(), more.begin(), more.end());
   }
-  EXPECT_FALSE(find_viewpoint(merged, test::density_of(merged, Context(2)), 0.0, Context(2)).has_value());
+  EXPECT_FALSE(find_viewpoint(merged, test::density_of(merged, Context(2)), 0.0, {}, Context(2)).has_value());
 }
 
 TEST(ViewpointSearch, FindsNothingInAnEvenCloud) {
   const Scan scan = prepared(test::sphere_cloud(test::kBall, 100.0, 20000, -2.0, 0.0, 1).positions);
   EXPECT_EQ(scan.viewpoint_source, ViewpointSource::none);
+}
+
+TEST(ViewpointSearch, LeavesTheOriginToAThinnedCloud) {
+  const auto points = test::seen_by_camera(Eigen::Vector3d::Zero(), 300);
+  for (const double spacing : {3.0, 6.0, 12.0}) {
+    std::vector<Eigen::Vector3f> thinned;
+    for (const std::uint32_t i : even_subset(points, spacing, Context(2))) thinned.push_back(points[i]);
+    EXPECT_EQ(prepared(thinned).viewpoint_source, ViewpointSource::origin) << spacing;
+  }
 }
 
 TEST(ViewpointSearch, DoesNotOverruleTheUser) {
@@ -76,8 +85,8 @@ TEST(ViewpointSearch, DoesNotOverruleTheUser) {
 
 TEST(ViewpointSearch, IsTheSameForAnyNumberOfThreads) {
   const auto points = test::seen_by_camera(kCamera);
-  const auto one = find_viewpoint(points, test::density_of(points, Context(1)), 0.0, Context(1));
-  const auto four = find_viewpoint(points, test::density_of(points, Context(4)), 0.0, Context(4));
+  const auto one = find_viewpoint(points, test::density_of(points, Context(1)), 0.0, {}, Context(1));
+  const auto four = find_viewpoint(points, test::density_of(points, Context(4)), 0.0, {}, Context(4));
   ASSERT_TRUE(one && four);
   EXPECT_EQ(one->position_in_scan, four->position_in_scan);
 }
