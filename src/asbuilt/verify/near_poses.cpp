@@ -4,8 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace asbuilt::verify {
 namespace {
@@ -23,7 +25,10 @@ class NearPoses {
       : pose_(model_from_scan), model_(model), distance_(static_cast<float>(distance_mm)) {
     for (const Eigen::Vector3f& measured : points_in_scan) {
       const Eigen::Vector3f point = (pose_ * measured.cast<double>()).cast<float>();
-      if (distance(point) <= distance_) on_model_.push_back(point);
+      const auto on = model_.field->at(point);
+      if (std::abs(on.distance) > distance_) continue;
+      on_model_.push_back(point);
+      outwards_.push_back(on.gradient);
     }
   }
 
@@ -44,20 +49,24 @@ class NearPoses {
       double share;
     };
     std::vector<Turned> turned;
+    const std::array<std::vector<double>, 3> faces = faces_of_model();
     for (const Eigen::Matrix3d& rotation : cube_rotations()) {
-      Eigen::AlignedBox3d seen;
-      for (const Eigen::Vector3f& point : on_model_) seen.extend(rotation * point.cast<double>());
-      for (int corner = 0; corner < 8; ++corner) {
-        Eigen::Vector3d shift;
-        for (int axis = 0; axis < 3; ++axis) {
-          const bool is_high = ((corner >> axis) & 1) != 0;
-          shift[axis] = is_high ? model_.box.max()[axis] - seen.max()[axis] : model_.box.min()[axis] - seen.min()[axis];
+      std::array<std::vector<double>, 3> shifts;
+      for (int axis = 0; axis < 3; ++axis) {
+        shifts[static_cast<std::size_t>(axis)] = flush_shifts(rotation.row(axis), axis, faces);
+      }
+      for (const double x : shifts[0]) {
+        for (const double y : shifts[1]) {
+          for (const double z : shifts[2]) {
+            Pose motion = Pose::Identity();
+            motion.linear() = rotation;
+            motion.translation() = Eigen::Vector3d(x, y, z);
+            constexpr std::size_t kFew = 5;
+            if (share_that_stays(motion, kFew) < kStayingShare - 0.1) continue;
+            const double share = share_that_stays(motion);
+            if (share >= kStayingShare && makes_another_pose(motion)) turned.push_back({motion, share});
+          }
         }
-        Pose motion = Pose::Identity();
-        motion.linear() = rotation;
-        motion.translation() = shift;
-        const double share = share_that_stays(motion);
-        if (share >= kStayingShare && makes_another_pose(motion)) turned.push_back({motion, share});
       }
     }
     std::ranges::stable_sort(turned, std::ranges::greater{}, &Turned::share);
@@ -89,14 +98,91 @@ class NearPoses {
     return rotations;
   }
 
+  // Of the coordinates those around which most lie, within `distance_` on either side, and how many; ascending input.
+  struct Crowd {
+    double middle = 0.0;
+    std::size_t count = 0;
+  };
+  [[nodiscard]] Crowd largest_crowd(const std::vector<float>& ascending) const {
+    Crowd largest;
+    double sum = 0.0;
+    for (std::size_t begin = 0, end = 0; begin < ascending.size(); ++begin) {
+      for (; end < ascending.size() && ascending[end] <= ascending[begin] + 2.0F * distance_; ++end) {
+        sum += static_cast<double>(ascending[end]);
+      }
+      const std::size_t count = end - begin;
+      if (count > largest.count) largest = {sum / static_cast<double>(count), count};
+      sum -= static_cast<double>(ascending[begin]);
+    }
+    return largest;
+  }
+
+  // Where along each axis of the part's box flat faces lie across it, the largest first.
+  [[nodiscard]] std::array<std::vector<double>, 3> faces_of_model() const {
+    constexpr std::size_t kMostFaces = 4;
+    constexpr double kLeastShare = 0.03;
+    constexpr float kAcross = 0.97F;  // cosine
+    const PointCloud& samples = model_.dense_samples;
+    std::array<std::vector<double>, 3> faces;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      std::vector<float> coordinates;
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        if (std::abs(samples.normals[i][axis]) > kAcross) coordinates.push_back(samples.positions[i][axis]);
+      }
+      std::ranges::sort(coordinates);
+      std::vector<double>& own = faces[static_cast<std::size_t>(axis)];
+      while (own.size() < kMostFaces) {
+        const Crowd face = largest_crowd(coordinates);
+        if (static_cast<double>(face.count) < kLeastShare * static_cast<double>(samples.size())) break;
+        own.push_back(face.middle);
+        std::erase_if(coordinates, [&](float c) { return std::abs(c - static_cast<float>(face.middle)) <= distance_; });
+      }
+    }
+    return faces;
+  }
+
+  // Shifts along an axis of the box that put the points on the model, turned, flush with its ends, or the face on which
+  // most of them lie onto a face of the model. `direction`: the axis, turned back.
+  [[nodiscard]] std::vector<double> flush_shifts(const Eigen::RowVector3d& direction, Eigen::Index axis,
+                                                 const std::array<std::vector<double>, 3>& faces) const {
+    constexpr double kFaceShare = 0.3;
+    std::vector<float> seen;
+    seen.reserve(on_model_.size());
+    for (const Eigen::Vector3f& point : on_model_) seen.push_back(direction.cast<float>().dot(point));
+    std::vector<double> shifts;
+    if (seen.empty()) return shifts;
+    std::ranges::sort(seen);
+    const auto add = [&](double shift) {
+      const bool is_new = std::ranges::all_of(
+          shifts, [&](double other) { return std::abs(other - shift) > 0.5 * static_cast<double>(distance_); });
+      if (is_new) shifts.push_back(shift);
+    };
+    add(model_.box.min()[axis] - static_cast<double>(seen.front()));
+    add(model_.box.max()[axis] - static_cast<double>(seen.back()));
+    const Crowd face = largest_crowd(seen);
+    if (static_cast<double>(face.count) < kFaceShare * static_cast<double>(seen.size())) return shifts;
+    for (const double other : faces[static_cast<std::size_t>(axis)]) add(other - face.middle);
+    return shifts;
+  }
+
   [[nodiscard]] float distance(const Eigen::Vector3f& point_in_model) const {
     return std::abs(model_.field->distance_at(point_in_model));
   }
 
-  [[nodiscard]] double share_that_stays(const Pose& motion) const {
+  // Of every `step`-th point. What was seen from outside stays only on a face that looks the same way.
+  [[nodiscard]] double share_that_stays(const Pose& motion, std::size_t step = 1) const {
     const Eigen::Isometry3f moved = motion.cast<float>();
-    const auto stays = [&](const Eigen::Vector3f& point) { return distance(moved * point) <= 2.0F * distance_; };
-    return static_cast<double>(std::ranges::count_if(on_model_, stays)) / static_cast<double>(on_model_.size());
+    constexpr float kLooksAway = -0.5F;  // cosine
+    const bool has_sides = !model_.is_open();
+    std::size_t staying = 0, asked = 0;
+    for (std::size_t i = 0; i < on_model_.size(); i += step, ++asked) {
+      const Eigen::Vector3f there = moved * on_model_[i];
+      if (distance(there) > 2.0F * distance_) continue;
+      const bool looks_away =
+          has_sides && model_.field->at(there).gradient.dot(moved.linear() * outwards_[i]) < kLooksAway;
+      staying += looks_away ? 0U : 1U;
+    }
+    return static_cast<double>(staying) / static_cast<double>(asked);
   }
 
   // Those that leave the model at some turn; the others (a barrel) fit at every angle and tell nothing.
@@ -160,6 +246,7 @@ class NearPoses {
   const model::PreparedModel& model_;
   float distance_;
   std::vector<Eigen::Vector3f> on_model_;  // in the model frame
+  std::vector<Eigen::Vector3f> outwards_;  // the gradient of the distance there
 };
 
 // The twist of a turn about a line, as the rows of PoseEvidence::information measure it.

@@ -20,7 +20,8 @@ namespace asbuilt::verify {
                                            const model::PreparedModel& model, double distance_mm);
 
 /// The poses that put the part's box into another of its 23 attitudes, flush with the scan points that lie on the model
-/// (within `distance_mm`), as far as most of these stay on it; the best 24. What shows only one flat face or an extrusion
+/// (within `distance_mm`) or with the face on which most of these lie on a face of the model, as far as most of them
+/// stay on it; the best 24. What shows only one flat face or an extrusion
 /// fits other sides of the part as well, where the rest of them is hidden.
 [[nodiscard]] std::vector<Pose> turned_in_box(const Pose& model_from_scan,
                                               std::span<const Eigen::Vector3f> points_in_scan,

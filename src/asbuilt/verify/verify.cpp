@@ -288,6 +288,25 @@ class Judge::Verification {
     return true;
   }
 
+  // A pose that only edges hold is not accepted before those that put another side of the part in its place have been
+  // judged: detection need not have proposed them, and of the best by support others may have been in front of it. Adds
+  // them to the judged `candidates`; says whether there are any.
+  [[nodiscard]] bool add_attitudes_of(const Candidate& accepted, std::vector<Candidate>& candidates) const {
+    if (options_.paper_mode || !is_loose(accepted)) return false;
+    std::vector<Candidate> attitudes{accepted};
+    if (!add_near_poses(attitudes)) return false;
+    const double apart = kSamePose * model_.diameter;
+    std::erase_if(attitudes, [&](const Candidate& c) {
+      return displacement_modulo_mm(c.model_from_scan, accepted.model_from_scan, model_) < apart;
+    });
+    parallel_for(context_, attitudes.size(), 1, [&](std::size_t i) {
+      if (!context_.cancelled()) register_densely(attitudes[i]);
+    });
+    candidates.insert(candidates.end(), attitudes.begin(), attitudes.end());
+    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
+    return !attitudes.empty();
+  }
+
   // Candidates with so much less support than the first are neither its rivals (is_comparable) nor likely to take its
   // place. The first, which stays whatever its support, is not refuted, if any is not: put_refuted_last.
   [[nodiscard]] std::vector<Candidate> contenders(std::vector<Candidate> candidates) const {
@@ -399,15 +418,18 @@ class Judge::Verification {
   }
 
  private:
+  [[nodiscard]] bool is_loose(const Candidate& candidate) const {
+    return candidate.weakest_direction < hold_needed(candidate.missing_share, options_);
+  }
+
   // The near-symmetric poses of the best candidates; of the first, if it is loose, those in other attitudes too.
   [[nodiscard]] std::vector<Candidate> near_candidates(const std::vector<Candidate>& candidates) const {
     constexpr std::size_t kMostLeaders = 3, kMostPoints = 4000;
     constexpr double kLeaderShare = 0.7;  // of the best support
     std::vector<Candidate> near;
     if (options_.paper_mode || candidates.empty()) return near;
-    const bool is_loose =
-        candidates.front().weakest_direction < hold_needed(candidates.front().missing_share, options_);
-    const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : is_loose ? 1 : 0;
+    const bool first_is_loose = is_loose(candidates.front());
+    const std::size_t leaders = model_.symmetry.has_near() ? kMostLeaders : first_is_loose ? 1 : 0;
     for (std::size_t i = 0; i < std::min(leaders, candidates.size()); ++i) {
       if (candidates[i].support < kLeaderShare * candidates.front().support) break;
       const Pose& pose = candidates[i].model_from_scan;
@@ -415,7 +437,7 @@ class Judge::Verification {
       const std::vector<Eigen::Vector3f> around =
           points_around(shuffled_foreground_, pose, model_, distance, kMostPoints);
       std::vector<Pose> poses = near_poses(pose, around, model_, distance);
-      if (i == 0 && is_loose) {
+      if (i == 0 && first_is_loose) {
         std::ranges::copy(turned_in_box(pose, around, model_, distance), std::back_inserter(poses));
       }
       for (const Pose& there : poses) {
@@ -643,7 +665,12 @@ Result<Detection> Judge::Verification::verdict_on(std::vector<Candidate> candida
   if (context_.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
 
   const auto compare = [&](const Candidate& first, const Candidate& second) { return contrast_of(first, second); };
-  Detection detection = decide(std::move(candidates), model_, options_, compare, one_of_several_);
+  Detection detection = decide(candidates, model_, options_, compare, one_of_several_);
+  const bool may_be_another = detection.status == Status::accepted || detection.reason == Reason::under_constrained;
+  if (may_be_another && add_attitudes_of(detection.best, candidates)) {
+    if (context_.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
+    detection = decide(std::move(candidates), model_, options_, compare, one_of_several_);
+  }
   if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
     detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);
     detection.status = Status::accepted;

@@ -70,6 +70,24 @@ TEST(TurnedInBox, OfAnAngleHalfSeenIsTheOtherLeg) {
   }
 }
 
+// Its wide leg seen from outside may also be the same leg seen from inside: its other face lies amid the part's box.
+TEST(TurnedInBox, OfALegSeenFromOutsideIsItsInside) {
+  const model::PreparedModel model = test::prepared(simulate::l_profile(120.0, 80.0, 12.0, 300.0), 0.04);
+  const Eigen::Vector3d low = model.box.min(), high = model.box.max();
+  const Pose scan_from_model = test::pose_at({0, 0, 600}), pose = scan_from_model.inverse();
+  std::vector<Eigen::Vector3f> seen;
+  for (double x = high.x() - 80.0; x <= high.x(); x += 4.0) {
+    for (double z = low.z(); z <= 0.0; z += 4.0) {
+      seen.push_back((scan_from_model * Eigen::Vector3d(x, low.y(), z)).cast<float>());
+    }
+  }
+  // Half a turn about the length, by which (x, y) goes to (-x, -y); the face then lies 12 mm further in.
+  Pose from_inside = Pose::Identity();
+  from_inside.linear() = Eigen::Vector3d(-1, -1, 1).asDiagonal();
+  from_inside.translation() << 2.0 * high.x() - 80.0, 2.0 * low.y() + 12.0, 0.0;
+  EXPECT_TRUE(has_pose(turned_in_box(pose, seen, model, 0.7), from_inside * pose, model));
+}
+
 // A drum, 80 mm across and 90 mm high, with five ribs 6 mm wide along its side.
 TriangleMesh ribbed_drum(double rib_height) {
   constexpr int kSides = 240;
