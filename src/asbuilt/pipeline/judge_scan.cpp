@@ -31,6 +31,8 @@ scan::ViewpointRequest local_request(scan::ViewpointRequest request, const io::S
   }
   // The origin, which `auto` would try, is kilometres away from points that needed an offset.
   if (!file.offset_mm.isZero(0.0)) request.may_be_origin = false;
+  // What was left of a file too large for memory is about as dense everywhere.
+  if (file.thinning) request.may_be_sought = false;
   return request;
 }
 

@@ -15,8 +15,7 @@ namespace asbuilt::pipeline {
 /// ribs), so that verification accepts a scan without its turn (verify::turns_are_nearly_equal): gives each scan the
 /// turn at which it meets the CAD (refine::turn_on_model), before scans that stand between draw others off theirs.
 /// Detected poses change with it. If at least two scans show theirs, those that do not are taken out of `scans` and
-/// become ambiguous
-/// (`symmetry`) in the record; else all stay and the record says so. Errors: cancelled.
+/// become ambiguous (`symmetry`) in the record; else none is taken out, and the record says so. Errors: cancelled.
 [[nodiscard]] Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& model,
                                         double near_equal_ratio, io::RunRecord& record, const Context& context);
 

@@ -130,9 +130,10 @@ Result<scan::Scan> prepare_search(const PointCloud& sought, const PointCloud& al
                                   const scan::ViewpointRequest& request, const scan::ScanOptions& options,
                                   const Context& context) {
   constexpr std::size_t kDrawn = 150000;
-  auto scan = scan::prepare_scan(sought, file_viewpoint, request, options, context);
   const bool has_all = sought.size() == all.size();
-  if (!scan || scan->viewpoint.known() || !request.automatic || has_all) return scan;
+  if (has_all || file_viewpoint || !request.automatic) {
+    return scan::prepare_scan(sought, file_viewpoint, request, options, context);
+  }
   PointCloud draw;
   Random random(0, "search viewpoint", all.size());
   const double share = static_cast<double>(kDrawn) / static_cast<double>(all.size());
@@ -142,12 +143,18 @@ Result<scan::Scan> prepare_search(const PointCloud& sought, const PointCloud& al
     if (all.has_normals()) draw.normals.push_back(all.normals[i]);
   }
   const auto seen = scan::prepare_scan(draw, std::nullopt, request, options, context);
-  if (!seen || seen->viewpoint_source != scan::ViewpointSource::points) return scan;
-  auto again = scan::prepare_scan(sought, std::nullopt, {false, seen->viewpoint}, options, context);
-  if (!again) return again;
-  again->viewpoint_source = seen->viewpoint_source;
-  again->warnings = seen->warnings;
-  return again;
+  if (!seen && seen.error().code == ErrorCode::cancelled) return tl::unexpected(seen.error());
+  scan::ViewpointRequest decided = request;
+  decided.may_be_sought = false;
+  if (seen && seen->viewpoint.known()) {
+    decided.automatic = false;
+    decided.stated = seen->viewpoint;
+  }
+  auto scan = scan::prepare_scan(sought, std::nullopt, decided, options, context);
+  if (!scan || decided.automatic) return scan;
+  scan->viewpoint_source = seen->viewpoint_source;
+  scan->warnings.insert(scan->warnings.end(), seen->warnings.begin(), seen->warnings.end());
+  return scan;
 }
 
 }  // namespace asbuilt::pipeline

@@ -32,7 +32,7 @@ namespace asbuilt::pipeline {
                                                                       const Context& context);
 
 /// Prepares the points in which the part is sought. These are as dense everywhere, which hides where the sensor stood:
-/// where that is not known otherwise, it is looked for in a fair draw of `all`. Errors and the other arguments:
+/// where the file does not say it, a fair draw of `all` is asked. Errors and the other arguments:
 /// scan::prepare_scan.
 [[nodiscard]] Result<scan::Scan> prepare_search(const PointCloud& sought, const PointCloud& all,
                                                 const std::optional<Eigen::Vector3d>& file_viewpoint,

@@ -3,15 +3,18 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/random.h"
+#include "asbuilt/core/result.h"
 #include "asbuilt/core/robust.h"
 
 namespace asbuilt::scan {
@@ -28,11 +31,12 @@ std::optional<double> log_density_at(std::span<const Eigen::Vector3f> points, co
                                      const Eigen::Vector3f& normal, const KdTree& tree, double noise_sigma_mm,
                                      std::vector<KdTree::Neighbour>& neighbours) {
   constexpr std::size_t kNeighbours = 60, kFewest = 12;
-  constexpr double kHeightInSigmas = 2.5, kMostOffCentre = 0.2;
+  constexpr double kHeightInSigmas = 2.5, kMostOffCentre = 0.2, kMostWider = 3.0;
   tree.nearest(point, kNeighbours, neighbours);
   if (neighbours.size() < kNeighbours) return std::nullopt;
   double reach = std::sqrt(static_cast<double>(neighbours.back().squared_distance));
   const double height = kHeightInSigmas * noise_sigma_mm;
+  if (kMostWider * reach < 1.5 * height) return std::nullopt;
   if (reach < 1.5 * height) {
     reach = 1.5 * height;
     tree.within(point, static_cast<float>(reach), neighbours);
@@ -55,6 +59,9 @@ std::optional<double> log_density_at(std::span<const Eigen::Vector3f> points, co
   return std::log(static_cast<double>(count - 1) / (std::numbers::pi * squared_radius));
 }
 
+constexpr std::array kAllSteps{PointDensity::Steps::angles, PointDensity::Steps::tangents,
+                               PointDensity::Steps::turns_about_y, PointDensity::Steps::turns_about_z};
+
 double rms_of(double robust_sum, std::size_t count) { return std::sqrt(robust_sum / static_cast<double>(count)); }
 
 }  // namespace
@@ -62,8 +69,11 @@ double rms_of(double robust_sum, std::size_t count) { return std::sqrt(robust_su
 // What a sensor at one place would measure.
 class PointDensity::View {
  public:
-  View(const Position& from, Steps steps, const Position& middle)
-      : from_(from), axis_((from - middle).normalized()), steps_(steps) {}
+  View(const Position& from, Steps steps, const Position& middle) : from_(from), steps_(steps) {
+    if (steps == Steps::tangents) axis_ = (from - middle).normalized();
+    if (steps == Steps::turns_about_y) axis_ = Eigen::Vector3d::UnitY();
+    if (steps == Steps::turns_about_z) axis_ = Eigen::Vector3d::UnitZ();
+  }
 
   /// ln(density) of a place, but for the rate. `gradient` by the position, the axis held.
   double predicted(const Place& place, Eigen::Vector3d* gradient = nullptr) const {
@@ -71,17 +81,26 @@ class PointDensity::View {
     const double squared_range = std::max(towards.squaredNorm(), 1e-12), range = std::sqrt(squared_range);
     const double along = place.normal.dot(towards);
     const bool is_flat = std::abs(along) < kLeastCosine * range;
-    const double depth = steps_ == Steps::tangents ? towards.dot(axis_) : range;
-    // No picture is wider than this: what stands farther out is seen in even angles.
-    constexpr double kLeastDepth = 0.2;
-    const bool is_in_picture = steps_ == Steps::tangents && depth > kLeastDepth * range;
-    const double scale = is_in_picture ? depth : steps_ == Steps::tangents ? kLeastDepth * range : range;
+    double log_w = 3.0 * std::log(range);
+    Eigen::Vector3d slope_of_log_w = 3.0 / squared_range * towards;
+    if (steps_ == Steps::tangents) {
+      constexpr double kLeastDepth = 0.2;  // of the range: no picture is wider
+      const double depth = towards.dot(axis_);
+      const bool is_in_picture = depth > kLeastDepth * range;
+      log_w = 3.0 * std::log(is_in_picture ? depth : kLeastDepth * range);
+      if (is_in_picture) slope_of_log_w = 3.0 / depth * axis_;
+    } else if (steps_ != Steps::angles) {
+      constexpr double kLeastSine = 0.05;  // of the angle to the axis: at it there would be no end of points
+      const Eigen::Vector3d aside = towards - towards.dot(axis_) * axis_;
+      const bool is_aside = aside.norm() > kLeastSine * range;
+      log_w = 2.0 * std::log(range) + std::log(is_aside ? aside.norm() : kLeastSine * range);
+      if (is_aside) slope_of_log_w = 2.0 / squared_range * towards + aside / aside.squaredNorm();
+    }
     if (gradient != nullptr) {
       *gradient = is_flat ? Eigen::Vector3d(towards / squared_range) : Eigen::Vector3d(place.normal / along);
-      *gradient -=
-          is_in_picture ? Eigen::Vector3d(3.0 / depth * axis_) : Eigen::Vector3d(3.0 / squared_range * towards);
+      *gradient -= slope_of_log_w;
     }
-    return std::log(is_flat ? kLeastCosine * range : std::abs(along)) - 3.0 * std::log(scale);
+    return std::log(is_flat ? kLeastCosine * range : std::abs(along)) - log_w;
   }
 
   double best_log_rate(std::span<const Place> places) const {
@@ -103,7 +122,7 @@ class PointDensity::View {
 
  private:
   Position from_;
-  Eigen::Vector3d axis_;
+  Eigen::Vector3d axis_ = Eigen::Vector3d::Zero();
   Steps steps_;
 };
 
@@ -111,11 +130,17 @@ PointDensity::PointDensity(std::span<const Eigen::Vector3f> points, std::span<co
                            std::span<const float> surface_variation, const KdTree& tree, double noise_sigma_mm,
                            std::size_t most, const Context& context) {
   constexpr float kMostVariation = 0.04F;
+  // One of each of so many even shares of the rows, since about half of them are near an edge.
   Random random(0, "point density", points.size());
-  std::vector<std::uint32_t> drawn(std::min(points.size(), 2 * most));  // about half of them are near an edge
-  for (std::uint32_t& i : drawn) i = static_cast<std::uint32_t>(random.below(points.size()));
+  std::vector<std::uint32_t> drawn(std::min(points.size(), 2 * most));
+  for (std::size_t d = 0; d < drawn.size(); ++d) {
+    const std::size_t begin = points.size() * d / drawn.size(), end = points.size() * (d + 1) / drawn.size();
+    drawn[d] = static_cast<std::uint32_t>(begin + random.below(end - begin));
+  }
+  for (std::size_t d = drawn.size(); d > 1; --d) std::swap(drawn[d - 1], drawn[random.below(d)]);
   std::vector<std::optional<double>> densities(drawn.size());
   parallel_for_blocks(context, drawn.size(), 64, [&](std::size_t begin, std::size_t end) {
+    if (context.cancelled()) return;
     std::vector<KdTree::Neighbour> neighbours;
     for (std::size_t d = begin; d < end; ++d) {
       const std::uint32_t i = drawn[d];
@@ -142,9 +167,9 @@ bool PointDensity::known() const {
 }
 
 double PointDensity::misfit(const Position& position_in_scan) const {
-  if (!known()) return 0.0;
+  ASBUILT_EXPECT(known(), "places at which the density was counted");
   double best = std::numeric_limits<double>::infinity();
-  for (const Steps steps : {Steps::angles, Steps::tangents}) {
+  for (const Steps steps : kAllSteps) {
     const View view(position_in_scan, steps, middle_);
     best = std::min(best, view.misfit(places_, view.best_log_rate(places_)));
   }
@@ -152,7 +177,7 @@ double PointDensity::misfit(const Position& position_in_scan) const {
 }
 
 double PointDensity::misfit_of_even() const {
-  if (!known()) return 0.0;
+  ASBUILT_EXPECT(known(), "places at which the density was counted");
   std::vector<double> densities;
   densities.reserve(places_.size());
   for (const Place& place : places_) densities.push_back(place.log_density);
@@ -209,15 +234,16 @@ std::vector<PointDensity::Fit> PointDensity::fits(const Context& context) const 
   if (!known()) return {};
   const std::span<const Place> places = places_;
   const auto coarse = places.first(std::min(places.size(), kCoarse));
-  std::vector<Fit> all(2 * kDirections + 1);
+  std::vector<Fit> all(kAllSteps.size() * (kDirections + 1));
   parallel_for(context, all.size(), 1, [&](std::size_t i) {
-    const std::size_t d = i / 2;  // even directions, on a spiral, and last the midst, where no camera stands
+    if (context.cancelled()) return;
+    const std::size_t d = i / kAllSteps.size();  // even directions, on a spiral, and last the midst
     const double z = 1.0 - (2.0 * static_cast<double>(d) + 1.0) / kDirections;
     const double across = std::sqrt(std::max(0.0, 1.0 - z * z));
     const double turn = static_cast<double>(d) * std::numbers::pi * (3.0 - std::sqrt(5.0));
     const Position start =
         middle_ + kStartInRadii * radius_mm_ * Position(across * std::cos(turn), across * std::sin(turn), z);
-    all[i] = fitted(coarse, i % 2 == 0 ? Steps::angles : Steps::tangents, d < kDirections ? start : middle_, 40);
+    all[i] = fitted(coarse, kAllSteps[i % kAllSteps.size()], d < kDirections ? start : middle_, 40);
   });
   std::ranges::stable_sort(all, {}, &Fit::misfit);
   // One from each basin: of coarse fits, then again of fine ones, since two may meet.
@@ -227,7 +253,7 @@ std::vector<PointDensity::Fit> PointDensity::fits(const Context& context) const 
       if (best.size() == kMostFits || fit.misfit > kComparable * ordered.front().misfit) break;
       const bool is_known = std::ranges::any_of(best, [&](const Fit& other) {
         const double apart_mm = (other.position_in_scan - fit.position_in_scan).norm();
-        return apart_mm < kSameBasin * (other.position_in_scan - middle_).norm();
+        return apart_mm < kSameBasin * std::max((other.position_in_scan - middle_).norm(), size_mm_);
       });
       if (!is_known) best.push_back(fit);
     }

@@ -11,14 +11,17 @@
 namespace asbuilt::scan {
 
 /// How densely a scan's surfaces are measured, and the place that explains it. Seen from c, a surface with the normal n
-/// around p has, v = c - p, per area
-///     k |n . v| / |v|^3      points, if the sensor measures in even steps of angle (k a steradian), as scanners that
-///     turn, k |n . v| / (a . v)^3  if in even steps of the tangent about the axis a, as cameras do; a goes through the
-///     middle.
+/// around p has |n . v| / w points per area times a rate k, v = c - p, where
+///
+///     w = |v|^3            if the sensor measures in even steps of angle (k a steradian),
+///     w = (a . v)^3        in even steps of the tangent about the axis a through the middle, as cameras do,
+///     w = |v|^2 |e x v|    in even steps of azimuth and height about e, as scanners on a tripod do; e is y or z of the
+///                          scan's frame, since exports seldom give up the vertical.
+///
 /// Signs of normals do not matter. Lengths in mm.
 class PointDensity {
  public:
-  enum class Steps { angles, tangents };
+  enum class Steps { angles, tangents, turns_about_y, turns_about_z };
 
   /// A viewpoint fitted to the densities, and what it leaves.
   struct Fit {
@@ -37,11 +40,11 @@ class PointDensity {
   /// Whether there were enough places to say anything.
   [[nodiscard]] bool known() const;
 
-  /// Fit::misfit for a sensor at that place, of the better steps and their best rate. 0 if not known(). Scans have at
-  /// most 0.2 where they were taken (docs/scan.md, section 4).
+  /// Fit::misfit for a sensor at that place, of the better steps and their best rate. Scans have at most 0.2 where they
+  /// were taken (docs/scan.md, section 4). Precondition: known().
   [[nodiscard]] double misfit(const Eigen::Vector3d& position_in_scan) const;
 
-  /// The same for a density that is the same everywhere, as in a cloud that was thinned evenly.
+  /// The same for a density that is the same everywhere, as in a cloud that was thinned evenly. Precondition: known().
   [[nodiscard]] double misfit_of_even() const;
 
   /// Fits from all around the scan and from its midst, best first, one from each basin, at most three. Empty if not

@@ -21,10 +21,13 @@ constexpr std::size_t kFewestPoints = 3;
 // Whether a found viewpoint is to be believed, and not an origin that is possible by the depth order. A cloud that was
 // thinned has lost its density, but not what hides behind what.
 bool is_clearer_than_rival(const FoundViewpoint& found, double misfit_of_rival) {
-  constexpr double kClearer = 0.65, kMuchMore = 5.0;
-  if (found.density_misfit > kClearer * misfit_of_rival) return false;
-  return found.shadows_of_rival.hidden > kMuchMore * found.shadows.hidden ||
-         found.shadows_of_rival.misfit() > kMuchMore * found.shadows.misfit();
+  constexpr double kClearer = 0.65, kTimes = 5.0, kLeastHidden = 0.005, kLeastMisfit = 0.05;
+  const auto is_far_less = [](double own, double of_rival, double least) {
+    return of_rival > kTimes * own && of_rival > own + least;
+  };
+  return found.density_misfit < kClearer * misfit_of_rival &&
+         (is_far_less(found.shadows.hidden, found.shadows_of_rival.hidden, kLeastHidden) ||
+          is_far_less(found.shadows.misfit(), found.shadows_of_rival.misfit(), kLeastMisfit));
 }
 
 /// Decides where the sensor stood. `tree` is of the scan's points.
@@ -55,27 +58,30 @@ void choose_viewpoint(Scan& scan, std::span<const Eigen::Vector3f> file_normals,
   double misfit_of_origin = 0.0;
   if (may_be_origin) {
     const PointDensity density = density_of(kFew);
+    if (!density.known()) return take(origin, ViewpointSource::origin);
     misfit_of_origin = density.misfit(origin.value);
     const bool is_clear = misfit_of_origin <= std::min(kClearMisfit, kClearToEven * density.misfit_of_even());
     if (is_clear) return take(origin, ViewpointSource::origin);
   }
-  const auto found =
-      find_viewpoint(scan.cloud.positions, density_of(kMany), scan.noise_sigma_mm, origin.value, context);
+  std::optional<FoundViewpoint> found;
+  if (request.may_be_sought) {
+    const auto rival = may_be_origin ? std::optional(origin.value) : std::nullopt;
+    found = find_viewpoint(scan.cloud.positions, density_of(kMany), scan.noise_sigma_mm, rival, context);
+  }
   if (found && (!may_be_origin || is_clearer_than_rival(*found, misfit_of_origin))) {
     const Viewpoint viewpoint{Viewpoint::Kind::point, found->position_in_scan};
     if (agrees(viewpoint)) {
       scan.warnings.push_back(
-          "the sensor did not stand at the scan's origin; where it stood was found from the points and is known to "
-          "some "
-          "hundredths of the range only: state it with --viewpoint if you know it");
+          "the sensor did not stand at the scan's origin; where it stood was found from the points, and is known to a "
+          "tenth of its distance or so: state it with --viewpoint if you know it");
       return take(viewpoint, ViewpointSource::points);
     }
   }
   if (may_be_origin) return take(origin, ViewpointSource::origin);
   scan.warnings.push_back(
-      "the points are not ordered as a sensor at the scan's origin would see them, and nothing tells where it stood, "
-      "so "
-      "no viewpoint is used; state it with --viewpoint");
+      "the sensor did not stand at the scan's origin, and the points do not tell where it did, so no viewpoint is "
+      "used; "
+      "state it with --viewpoint");
 }
 
 void turn(std::vector<Eigen::Vector3f>& normals, const Context& context, const auto& wanted_direction) {
@@ -134,6 +140,7 @@ Result<Scan> prepare_scan(const PointCloud& raw, const std::optional<Eigen::Vect
   scan.surface_variation = std::move(fitted.variation);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
   choose_viewpoint(scan, file_normals, file_viewpoint, request, tree, context);
+  if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while preparing a scan");
   scan.spacing_by_range = SpacingByRange(scan.cloud.positions, tree, scan.viewpoint);
   scan.normals_oriented = orient_normals(scan, file_normals, options.use_file_normals, context);
   return scan;

@@ -12,10 +12,19 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 
 }  // namespace
 
-Shadows ShadowImage::seen_from(const Eigen::Vector3d& position, double cell, const DepthJump& jump) {
-  constexpr int kMostCells = 4096;
-  project(position, std::clamp(static_cast<int>(2.0 / cell), 16, kMostCells));
-  std::size_t hidden = 0, cells = 0;
+Shadows ShadowImage::seen_from(const Eigen::Vector3d& position, double cell, const DepthJump& least_jump) {
+  constexpr double kFewestAcross = 16.0, kMostAcross = 4096.0, kMostCellsPerPoint = 8.0;
+  constexpr float kJumpInCells = 4.0F;
+  double across = std::clamp(2.0 / std::max(cell, 1e-6), kFewestAcross, kMostAcross);
+  project(position, static_cast<int>(across));
+  const double most_cells = kMostCellsPerPoint * static_cast<double>(points_.size()) + kMostAcross;
+  if (cells() > most_cells) {
+    across = std::max(kFewestAcross, across * std::sqrt(most_cells / cells()));
+    project(position, static_cast<int>(across));
+  }
+  DepthJump jump = least_jump;
+  jump.share_of_depth = std::max(jump.share_of_depth, kJumpInCells * 2.0F / std::floor(static_cast<float>(across)));
+  std::size_t hidden = 0, measured = 0;
   double gaps = 0.0;
   for (int side = 0; side < 6; ++side) {
     Side& image = sides_[static_cast<std::size_t>(side)];
@@ -24,10 +33,10 @@ Shadows ShadowImage::seen_from(const Eigen::Vector3d& position, double cell, con
     for (const Place& place : place_) {
       if (place.side == side && jump.is_between(image.at(place.row, place.column), place.depth)) ++hidden;
     }
-    cells += add_gaps(image, jump, gaps);
+    measured += add_gaps(image, jump, gaps);
   }
   return {static_cast<double>(hidden) / static_cast<double>(std::max<std::size_t>(1, points_.size())),
-          gaps / static_cast<double>(std::max<std::size_t>(1, cells))};
+          gaps / static_cast<double>(std::max<std::size_t>(1, measured))};
 }
 
 void ShadowImage::project(const Eigen::Vector3d& from, int across) {
@@ -54,6 +63,12 @@ void ShadowImage::project(const Eigen::Vector3d& from, int across) {
     side.first_column = std::min(side.first_column, place.column);
     side.last_column = std::max(side.last_column, place.column);
   }
+}
+
+double ShadowImage::cells() const {
+  double sum = 0.0;
+  for (const Side& side : sides_) sum += side.count == 0 ? 0.0 : static_cast<double>(side.rows()) * side.columns();
+  return sum;
 }
 
 void ShadowImage::fill(Side& image, int side) {

@@ -35,8 +35,9 @@ class ShadowImage {
   explicit ShadowImage(std::span<const Eigen::Vector3f> points) : points_(points), place_(points.size()) {}
 
   /// `cell` is the width of a cell as a tangent: 1.5 times the angle between neighbouring measurements leaves hardly a
-  /// cell of a continuous surface empty.
-  [[nodiscard]] Shadows seen_from(const Eigen::Vector3d& position, double cell, const DepthJump& jump);
+  /// cell of a continuous surface empty. Where strays far aside, or a very narrow field of view, would make more than
+  /// some eight cells a point of it, cells are wider, and so is the jump in depth.
+  [[nodiscard]] Shadows seen_from(const Eigen::Vector3d& position, double cell, const DepthJump& least_jump);
 
  private:
   struct Place {
@@ -56,6 +57,7 @@ class ShadowImage {
     }
   };
   void project(const Eigen::Vector3d& from, int across);
+  [[nodiscard]] double cells() const;
   void fill(Side& image, int side);
   static std::size_t add_gaps(Side& image, const DepthJump& jump, double& gaps);
 

@@ -23,6 +23,7 @@ struct ViewpointRequest {
   bool automatic = true;
   Viewpoint stated;
   bool may_be_origin = true;  ///< `automatic` tries the scan's origin
+  bool may_be_sought = true;  ///< `automatic` asks the points, whose density must be the sensor's
 };
 
 /// Who says where the sensor stood.

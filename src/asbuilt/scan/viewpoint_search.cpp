@@ -47,7 +47,9 @@ Sharpened sharpened(std::span<const Eigen::Vector3f> points, const PointDensity:
   std::vector<ShadowImage> images(6, ShadowImage(points));
   Sharpened best{fit.position_in_scan, images[0].seen_from(fit.position_in_scan, cell, jump), {}};
   std::array<Sharpened, 6> tried;
-  for (double step = kFirstStep * range; step > kLastStep * range;) {
+  constexpr int kMostMoves = 100;
+  double step = kFirstStep * range;
+  for (int move = 0; move < kMostMoves && step > kLastStep * range && !context.cancelled(); ++move) {
     parallel_for(context, tried.size(), 1, [&](std::size_t t) {
       const auto axis = static_cast<Eigen::Index>(t / 2);
       tried[t].from = best.from + (t % 2 == 0 ? step : -step) * axes.col(axis);
@@ -84,6 +86,7 @@ std::optional<FoundViewpoint> find_viewpoint(std::span<const Eigen::Vector3f> po
   constexpr std::size_t kMostImagePoints = 400000;
   // Of scans with a known viewpoint, and of merged and thinned clouds; docs/scan.md, section 4.
   constexpr double kMostMisfit = 0.2, kMostMisfitToEven = 0.6, kMostHidden = 0.05;
+  if (!density.known()) return std::nullopt;
   const double most_misfit = std::min(kMostMisfit, kMostMisfitToEven * density.misfit_of_even());
   const std::vector<Eigen::Vector3f> seen = drawn(points, kMostImagePoints);
   const double log_thinning = std::log(static_cast<double>(points.size()) / static_cast<double>(seen.size()));
@@ -95,7 +98,7 @@ std::optional<FoundViewpoint> find_viewpoint(std::span<const Eigen::Vector3f> po
     if (best && sharp.shadows.misfit() >= best->shadows.misfit()) continue;
     best = {sharp.from, fit.misfit, sharp.shadows, sharp.shadows_of_rival};
   }
-  if (best && best->shadows.hidden > kMostHidden) return std::nullopt;
+  if (context.cancelled() || (best && best->shadows.hidden > kMostHidden)) return std::nullopt;
   return best;
 }
 

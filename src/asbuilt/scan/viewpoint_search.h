@@ -21,7 +21,8 @@ struct FoundViewpoint {
 
 /// Looks for the viewpoint of a scan that was moved to a frame of its own: the places that explain the density of the
 /// points (PointDensity), each moved until what the front surfaces hide is just what is missing behind them (Shadows).
-/// Good to a few hundredths of the range, most of it along the line of sight, where it hides and reveals least.
+/// Good to some hundredths of the range, seldom a tenth, most of it along the line of sight, where it hides and reveals
+/// least.
 /// Nothing, if no place explains the points: a merged or evenly thinned cloud, too few points, too much noise.
 /// `density` is that of `points`; a rival is looked from with the same cells. The result does not depend on the number
 /// of threads.

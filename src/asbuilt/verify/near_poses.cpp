@@ -176,11 +176,9 @@ class NearPoses {
     const bool has_sides = !model_.is_open();
     std::size_t staying = 0, asked = 0;
     for (std::size_t i = 0; i < on_model_.size(); i += step, ++asked) {
-      const Eigen::Vector3f there = moved * on_model_[i];
-      if (distance(there) > 2.0F * distance_) continue;
-      const bool looks_away =
-          has_sides && model_.field->at(there).gradient.dot(moved.linear() * outwards_[i]) < kLooksAway;
-      staying += looks_away ? 0U : 1U;
+      const auto there = model_.field->at(moved * on_model_[i]);
+      const bool looks_away = has_sides && there.gradient.dot(moved.linear() * outwards_[i]) < kLooksAway;
+      staying += !looks_away && std::abs(there.distance) <= 2.0F * distance_ ? 1U : 0U;
     }
     return static_cast<double>(staying) / static_cast<double>(asked);
   }

@@ -50,6 +50,7 @@ constexpr double kClearly = 2.0;     // times the contradictions allowed: such a
 constexpr double kPlausible = 0.75;  // of the score that is needed: where it pays to look for a better place
 
 constexpr double kSamePose = 0.01;  // displacement / diameter up to which two candidates need not both go on
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
 /// One level of the coarse-to-fine pyramid (Sec. 3.1: three of them).
 struct Level {
@@ -283,7 +284,7 @@ class Judge::Verification {
     const double apart = kSamePose * model_.diameter;
     near = best_different(std::move(near), kMostNear, apart, model_, options_);
     candidates.insert(candidates.end(), near.begin(), near.end());
-    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
+    candidates = best_different(std::move(candidates), kAll, apart, model_, options_);
     put_refuted_last(level, candidates);
     return true;
   }
@@ -303,7 +304,7 @@ class Judge::Verification {
       if (!context_.cancelled()) register_densely(attitudes[i]);
     });
     candidates.insert(candidates.end(), attitudes.begin(), attitudes.end());
-    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
+    candidates = best_different(std::move(candidates), kAll, apart, model_, options_);
     return !attitudes.empty();
   }
 
@@ -506,7 +507,7 @@ class Judge::Verification {
     constexpr double kShareBySupport = 0.75;
     const double apart = kSamePose * model_.diameter;
     if (options_.paper_mode) return best_different(std::move(candidates), level.survivors, apart, model_, options_);
-    candidates = best_different(std::move(candidates), candidates.size(), apart, model_, options_);
+    candidates = best_different(std::move(candidates), kAll, apart, model_, options_);
     put_refuted_last(level, candidates);
     if (candidates.size() <= level.survivors) return candidates;
     const auto by_support = static_cast<std::ptrdiff_t>(kShareBySupport * static_cast<double>(level.survivors));

@@ -136,5 +136,19 @@ TEST(PrepareSearch, LooksForTheViewpointInAllPoints) {
   EXPECT_FALSE(prepare_search(sought, all, std::nullopt, nothing, {}, Context(2)).value().viewpoint.known());
 }
 
+// A hall is in order from anywhere within, and what was thinned has no density left.
+TEST(PrepareSearch, DoesNotBelieveAnOriginElsewhereInTheRoom) {
+  const Eigen::Vector3d tripod(-2000, -1000, 0);
+  PointCloud all, sought;
+  all.positions = test::seen_from_tripod(tripod, 0.3);
+  for (const std::uint32_t i : even_subset(all.positions, 120.0, Context(2)))
+    sought.positions.push_back(all.positions[i]);
+  ASSERT_EQ(scan::prepare_scan(sought, std::nullopt, {}, {}, Context(2)).value().viewpoint_source,
+            scan::ViewpointSource::origin);
+  const scan::Scan scan = prepare_search(sought, all, std::nullopt, {}, {}, Context(2)).value();
+  ASSERT_EQ(scan.viewpoint_source, scan::ViewpointSource::points);
+  EXPECT_LT((scan.viewpoint.value - tripod).norm(), 400.0);  // a tenth of the usual range
+}
+
 }  // namespace
 }  // namespace asbuilt::pipeline

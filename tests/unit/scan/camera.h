@@ -47,6 +47,32 @@ inline std::vector<Eigen::Vector3f> seen_by_camera(const Eigen::Vector3d& at, in
   return points;
 }
 
+/// What a scanner on a tripod sees of a room 10 x 8 x 4 m with a pillar, in even steps of azimuth and of the angle from
+/// the z axis, from 20 to 110 degrees. The room's floor is z = -1500 mm, its middle the origin.
+inline std::vector<Eigen::Vector3f> seen_from_tripod(const Eigen::Vector3d& at, double step_deg) {
+  const Eigen::Vector3d low(-5000, -4000, -1500), high(5000, 4000, 2500);
+  const Eigen::Vector2d pillar(1000, 500);
+  constexpr double kPillarRadius = 300.0, kDegree = 3.14159265358979323846 / 180.0;
+  std::vector<Eigen::Vector3f> points;
+  for (double zenith = 20.0; zenith < 110.0; zenith += step_deg) {
+    for (double azimuth = 0.0; azimuth < 360.0; azimuth += step_deg) {
+      const Eigen::Vector3d ray(std::sin(zenith * kDegree) * std::cos(azimuth * kDegree),
+                                std::sin(zenith * kDegree) * std::sin(azimuth * kDegree), std::cos(zenith * kDegree));
+      double range = std::numeric_limits<double>::infinity();
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        if (ray[axis] == 0.0) continue;
+        range = std::min(range, ((ray[axis] > 0.0 ? high : low)[axis] - at[axis]) / ray[axis]);
+      }
+      const Eigen::Vector2d to_pillar = pillar - at.head<2>(), flat = ray.head<2>();
+      const double a = flat.squaredNorm(), b = flat.dot(to_pillar);
+      const double root = b * b - a * (to_pillar.squaredNorm() - kPillarRadius * kPillarRadius);
+      if (root > 0.0 && b > 0.0) range = std::min(range, (b - std::sqrt(root)) / a);
+      points.push_back((at + range * ray).cast<float>());
+    }
+  }
+  return points;
+}
+
 /// The angle between neighbouring pixels amid the picture.
 inline double pixel_angle(int pixels_across = 150) { return 0.9 / pixels_across; }
 

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <stop_token>
+
 #include "asbuilt/core/pose.h"
 #include "asbuilt/scan/scan.h"
 #include "unit/scan/camera.h"
@@ -43,6 +45,37 @@ TEST(ViewpointSearch, FindsTheCameraInAnyFrame) {
     EXPECT_TRUE(scan.normals_oriented);
     EXPECT_THAT(scan.warnings, testing::SizeIs(1));
   }
+}
+
+TEST(ViewpointSearch, FindsATripodAndNotAnOriginElsewhereInTheRoom) {
+  const Eigen::Vector3d tripod(-2000, -1000, 0);
+  const Scan scan = prepared(test::seen_from_tripod(tripod, 0.5));
+  ASSERT_EQ(scan.viewpoint_source, ViewpointSource::points);
+  EXPECT_LT((scan.viewpoint.value - tripod).norm(), 400.0);  // a tenth of the usual range
+  const Scan truly = prepared(moved(test::seen_from_tripod(tripod, 0.5), Pose(Eigen::Translation3d(-tripod))));
+  EXPECT_EQ(truly.viewpoint_source, ViewpointSource::origin);
+}
+
+// Strays all around widen the picture, and must not fill the memory with empty cells.
+TEST(ViewpointSearch, IsNotLedAstrayByStrays) {
+  auto points = test::seen_by_camera(kCamera);
+  for (const Eigen::Vector3f& stray : test::sphere_cloud(kCamera, 1500.0, 100, -2.0, 0.0, 1).positions) {
+    points.push_back(stray);
+  }
+  const Eigen::Vector3d shift(3000, -500, 900);
+  const Scan scan = prepared(moved(points, Pose(Eigen::Translation3d(shift))));
+  ASSERT_EQ(scan.viewpoint_source, ViewpointSource::points);
+  EXPECT_LT((scan.viewpoint.value - kCamera - shift).norm(), 0.15 * test::kWall);
+}
+
+TEST(ViewpointSearch, StopsWhenCancelled) {
+  const auto points = test::seen_by_camera(kCamera);
+  const PointDensity density = test::density_of(points, Context(1));
+  std::stop_source stop;
+  stop.request_stop();
+  Context stopped(1);
+  stopped.stop = stop.get_token();
+  EXPECT_FALSE(find_viewpoint(points, density, 0.0, {}, stopped).has_value());
 }
 
 TEST(ViewpointSearch, LeavesTheOriginWhereTheCameraStoodThere) {
