@@ -312,7 +312,11 @@ Finding rivalry(const std::vector<Candidate>& candidates, const model::PreparedM
     // one.
     constexpr double kTwice = 2.0;
     const bool is_firm = best.weakest_direction >= kTwice * hold_needed(best.missing_share, options);
-    const bool leads = is_firm && best.support - rival.support >= options.min_margin * best.support;
+    // What one pose explains and the other does not would have a vote. Without any, a lead in support comes of samples
+    // that both explain, one where there are more points than the other: it says nothing.
+    constexpr double kAny = 0.25;
+    const bool is_told = !contrast || contrast->total() >= kAny * options.min_contrast;
+    const bool leads = is_firm && is_told && best.support - rival.support >= options.min_margin * best.support;
     if (outcome == Outcome::undecided &&
         are_nearly_equal(best.model_from_scan, rival.model_from_scan, model, options)) {
       continue;

@@ -146,6 +146,17 @@ TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
   EXPECT_EQ(decide({best, rival}, block(), {}, undecided).reason, Reason::ambiguous_pose);
 }
 
+TEST(Verdict, ALeadInSupportDecidesNothingWhereTheScanShowsNoDifference) {
+  const Candidate best = flawless();
+  Candidate rival = flawless();
+  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * block().diameter, 0, 0));
+  rival.support = 0.9 * best.support;
+  const Comparison nothing = [](const Candidate&, const Candidate&) { return PoseContrast{0.0, 0.0}; };
+  const Detection detection = decide({best, rival}, block(), {}, nothing);
+  EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
+  EXPECT_THAT(detection.explanation, testing::HasSubstr("does not show what tells the pose"));
+}
+
 TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
