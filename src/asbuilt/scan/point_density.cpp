@@ -161,6 +161,13 @@ PointDensity::PointDensity(std::span<const Eigen::Vector3f> points, std::span<co
   size_mm_ = std::max(median_of(std::move(radii)), 1e-9);
 }
 
+// A scanner that turns stands amid what it measures; looking at things from outside, it makes steps of about even
+// angles.
+bool PointDensity::may_have(Steps steps, const Position& position_in_scan) const {
+  const bool turns = steps == Steps::turns_about_y || steps == Steps::turns_about_z;
+  return !turns || (position_in_scan - middle_).norm() < radius_mm_;
+}
+
 bool PointDensity::known() const {
   constexpr std::size_t kFewest = 150;
   return places_.size() >= kFewest;
@@ -170,6 +177,7 @@ double PointDensity::misfit(const Position& position_in_scan) const {
   ASBUILT_EXPECT(known(), "places at which the density was counted");
   double best = std::numeric_limits<double>::infinity();
   for (const Steps steps : kAllSteps) {
+    if (!may_have(steps, position_in_scan)) continue;
     const View view(position_in_scan, steps, middle_);
     best = std::min(best, view.misfit(places_, view.best_log_rate(places_)));
   }
@@ -245,6 +253,7 @@ std::vector<PointDensity::Fit> PointDensity::fits(const Context& context) const 
         middle_ + kStartInRadii * radius_mm_ * Position(across * std::cos(turn), across * std::sin(turn), z);
     all[i] = fitted(coarse, kAllSteps[i % kAllSteps.size()], d < kDirections ? start : middle_, 40);
   });
+  std::erase_if(all, [&](const Fit& fit) { return !may_have(fit.steps, fit.position_in_scan); });
   std::ranges::stable_sort(all, {}, &Fit::misfit);
   // One from each basin: of coarse fits, then again of fine ones, since two may meet.
   const auto basins = [&](const std::vector<Fit>& ordered) {

@@ -57,6 +57,7 @@ class PointDensity {
     double log_density;  // of points per mm^2
   };
   class View;
+  [[nodiscard]] bool may_have(Steps steps, const Eigen::Vector3d& position_in_scan) const;
   [[nodiscard]] Fit fitted(std::span<const Place> places, Steps steps, const Eigen::Vector3d& start,
                            int most_steps) const;
 
