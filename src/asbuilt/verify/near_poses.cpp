@@ -298,18 +298,22 @@ double weakest_direction(const PoseEvidence& evidence, const model::PreparedMode
   return std::max(0.0, solver.eigenvalues()[0]) / static_cast<double>(evidence.explained_samples);
 }
 
+double surface_moved_mm(const Pose& motion, const model::PreparedModel& model) {
+  const Eigen::Isometry3f moved = motion.cast<float>();
+  float largest = 0.0F;
+  for (const Eigen::Vector3f& sample : model.dense_samples.positions) {
+    largest = std::max(largest, std::abs(model.field->distance_at(moved * sample)));
+  }
+  return static_cast<double>(largest);
+}
+
 bool turns_are_nearly_equal(const model::PreparedModel& model, double ratio) {
   constexpr int kTurns = 7;
   constexpr double kGolden = 0.381966011250105;  // of a turn, so that no order of a symmetry divides them all
-  const auto limit = static_cast<float>(ratio * model.diameter);
   for (const model::NearAxis& axis : model.symmetry.near_axes) {
     for (int i = 1; i <= kTurns; ++i) {
-      const Eigen::Isometry3f turn =
-          model::rotation_about(axis.axis, axis.point, 2.0 * kPi * kGolden * i).inverse().cast<float>();
-      const auto leaves = [&](const Eigen::Vector3f& sample) {
-        return std::abs(model.field->distance_at(turn * sample)) > limit;
-      };
-      if (std::ranges::any_of(model.dense_samples.positions, leaves)) return false;
+      const Pose turn = model::rotation_about(axis.axis, axis.point, 2.0 * kPi * kGolden * i);
+      if (surface_moved_mm(turn.inverse(), model) > ratio * model.diameter) return false;
     }
   }
   return !model.symmetry.near_axes.empty();

@@ -21,8 +21,8 @@ namespace asbuilt::verify {
 
 /// The poses that put the part's box into another of its 23 attitudes, flush with the scan points that lie on the model
 /// (within `distance_mm`) or with the face on which most of these lie on a face of the model, as far as most of them
-/// stay on it; the best 24. What shows only one flat face or an extrusion
-/// fits other sides of the part as well, where the rest of them is hidden.
+/// stay on it; the best 24. What shows only one flat face or an extrusion fits other sides of the part as well, where
+/// the rest of them is hidden.
 [[nodiscard]] std::vector<Pose> turned_in_box(const Pose& model_from_scan,
                                               std::span<const Eigen::Vector3f> points_in_scan,
                                               const model::PreparedModel& model, double distance_mm);
@@ -34,6 +34,9 @@ namespace asbuilt::verify {
 /// As PoseEvidence::weakest_direction(), but turns that the part's symmetry makes invisible are no loss; neither, if
 /// `near_too`, those about axes of near-symmetry.
 [[nodiscard]] double weakest_direction(const PoseEvidence& evidence, const model::PreparedModel& model, bool near_too);
+
+/// Largest distance from the part's surface of that surface moved, mm; infinite beyond the field.
+[[nodiscard]] double surface_moved_mm(const Pose& motion, const model::PreparedModel& model);
 
 /// Whether every turn about an axis of near-symmetry leaves all of the surface within `ratio` of the diameter of
 /// itself: then a scan may be accepted without showing its turn. False where there is no such axis.

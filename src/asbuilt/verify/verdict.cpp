@@ -277,21 +277,11 @@ void put_clear_first(std::vector<Candidate>& candidates, const VerifyOptions& op
   if (clear != candidates.end()) std::rotate(candidates.begin(), clear, clear + 1);
 }
 
-// Largest distance of the part's surface at one pose from that at another; infinite beyond the field.
-double surface_apart_mm(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model) {
-  const Eigen::Isometry3f a_from_b = (a_from_scan * b_from_scan.inverse()).cast<float>();
-  float largest = 0.0F;
-  for (const Eigen::Vector3f& sample : model.dense_samples.positions) {
-    largest = std::max(largest, std::abs(model.field->distance_at(a_from_b * sample)));
-  }
-  return static_cast<double>(largest);
-}
-
 // Two poses that put the surface at the same places but for less than parts deviate by: where the scan does not tell
 // them apart, the pose is known modulo the motion between them.
 bool are_nearly_equal(const Pose& a_from_scan, const Pose& b_from_scan, const model::PreparedModel& model,
                       const VerifyOptions& options) {
-  return surface_apart_mm(a_from_scan, b_from_scan, model) <= options.near_equal_ratio * model.diameter;
+  return surface_moved_mm(a_from_scan * b_from_scan.inverse(), model) <= options.near_equal_ratio * model.diameter;
 }
 
 // A different pose that would itself be accepted and that nothing tells from the best.

@@ -209,17 +209,22 @@ View seen_from_above(const TriangleMesh& mesh) {
   return view;
 }
 
+// Six degrees about `middle` and 5 % of the diameter off, in directions drawn for the seed.
+Pose rough_start(const TriangleMesh& mesh, const Eigen::Vector3d& middle, std::uint64_t seed) {
+  Random random(seed, "rough start", 0);
+  const Eigen::Vector3d shift = 0.05 * diameter(mesh) * test::random_direction(random);
+  return Eigen::Translation3d(middle + shift) *
+         Eigen::AngleAxisd(6.0 * 3.14159265358979 / 180.0, test::random_direction(random)) *
+         Eigen::Translation3d(-middle);
+}
+
 TEST(StartNearModel, BringsAStartThatIsSixDegreesAndFivePercentOffToTheCad) {
   const TriangleMesh mesh = stepped_block();
   const model::SurfaceDistance surface(mesh);
   const Eigen::Vector3d middle(50.0, 30.0, 20.0);
   View view = seen_from_above(mesh);
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    Random random(seed, "rough start", 0);
-    const Eigen::Vector3d shift = 0.05 * diameter(mesh) * test::random_direction(random);
-    view.model_from_scan = Eigen::Translation3d(middle + shift) *
-                           Eigen::AngleAxisd(6.0 * 3.14159265358979 / 180.0, test::random_direction(random)) *
-                           Eigen::Translation3d(-middle);
+    view.model_from_scan = rough_start(mesh, middle, seed);
     const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
     EXPECT_LT(worst_displacement(mesh, start), 0.1) << "seed " << seed;  // two sigma; the start was 8 to 12 mm off
   }
@@ -256,11 +261,7 @@ TEST(StartNearModel, BeginsAnewWhereOneFitEndsElsewhere) {
   int found = 0;
   constexpr int kStarts = 20;
   for (std::uint64_t seed = 0; seed < kStarts; ++seed) {
-    Random random(seed, "rough start", 0);
-    const Eigen::Vector3d shift = 0.05 * diameter(mesh) * test::random_direction(random);
-    view.model_from_scan = Eigen::Translation3d(middle + shift) *
-                           Eigen::AngleAxisd(6.0 * 3.14159265358979 / 180.0, test::random_direction(random)) *
-                           Eigen::Translation3d(-middle);
+    view.model_from_scan = rough_start(mesh, middle, seed);
     const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
     found += worst_displacement(mesh, start) < 0.3 ? 1 : 0;
   }

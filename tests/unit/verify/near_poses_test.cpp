@@ -41,6 +41,18 @@ TEST(NearPoses, OfAPartWithoutNearSymmetryAreNone) {
   EXPECT_TRUE(near_poses(test::pose_at({0, 0, 600}).inverse(), scan.cloud.positions, model, 0.7).empty());
 }
 
+// The outer 80 mm of an angle's wide leg, and one end, in the scan frame.
+std::vector<Eigen::Vector3f> outside_of_wide_leg(const model::PreparedModel& model, const Pose& scan_from_model) {
+  const Eigen::Vector3d low = model.box.min(), high = model.box.max();
+  std::vector<Eigen::Vector3f> seen;
+  for (double x = high.x() - 80.0; x <= high.x(); x += 4.0) {
+    for (double z = low.z(); z <= 0.0; z += 4.0) {
+      seen.push_back((scan_from_model * Eigen::Vector3d(x, low.y(), z)).cast<float>());
+    }
+  }
+  return seen;
+}
+
 // Of an angle of 120 x 80 mm, the outer 80 mm of the wide leg and one end are in sight: they fit the narrow leg as
 // well.
 TEST(TurnedInBox, OfAnAngleHalfSeenIsTheOtherLeg) {
@@ -50,12 +62,7 @@ TEST(TurnedInBox, OfAnAngleHalfSeenIsTheOtherLeg) {
   ASSERT_NEAR(high.x() - low.x(), 120.0, 0.1);
   ASSERT_NEAR(high.y() - low.y(), 80.0, 0.1);
   const Pose scan_from_model = test::pose_at({0, 0, 600}), pose = scan_from_model.inverse();
-  std::vector<Eigen::Vector3f> seen;
-  for (double x = high.x() - 80.0; x <= high.x(); x += 4.0) {
-    for (double z = low.z(); z <= 0.0; z += 4.0) {
-      seen.push_back((scan_from_model * Eigen::Vector3d(x, low.y(), z)).cast<float>());
-    }
-  }
+  const std::vector<Eigen::Vector3f> seen = outside_of_wide_leg(model, scan_from_model);
   // The mirror image in the legs' bisector, turned end for end: (x, y, z) goes to (y, x - 40, -z), from the corner.
   Pose swapped = Pose::Identity();
   swapped.linear() << 0, 1, 0, 1, 0, 0, 0, 0, -1;
@@ -75,12 +82,7 @@ TEST(TurnedInBox, OfALegSeenFromOutsideIsItsInside) {
   const model::PreparedModel model = test::prepared(simulate::l_profile(120.0, 80.0, 12.0, 300.0), 0.04);
   const Eigen::Vector3d low = model.box.min(), high = model.box.max();
   const Pose scan_from_model = test::pose_at({0, 0, 600}), pose = scan_from_model.inverse();
-  std::vector<Eigen::Vector3f> seen;
-  for (double x = high.x() - 80.0; x <= high.x(); x += 4.0) {
-    for (double z = low.z(); z <= 0.0; z += 4.0) {
-      seen.push_back((scan_from_model * Eigen::Vector3d(x, low.y(), z)).cast<float>());
-    }
-  }
+  const std::vector<Eigen::Vector3f> seen = outside_of_wide_leg(model, scan_from_model);
   // Half a turn about the length, by which (x, y) goes to (-x, -y); the face then lies 12 mm further in.
   Pose from_inside = Pose::Identity();
   from_inside.linear() = Eigen::Vector3d(-1, -1, 1).asDiagonal();
