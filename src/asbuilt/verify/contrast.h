@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+#include <memory>
+
 #include "asbuilt/core/pose.h"
 #include "asbuilt/model/prepared_model.h"
 #include "asbuilt/verify/evidence.h"
@@ -48,5 +51,24 @@ struct PoseContrast {
 /// search and a ray for those that differ.
 [[nodiscard]] PoseContrast contrast(const SizedPose& first, const SizedPose& second, const model::PreparedModel& model,
                                     const ScanEvidence& scan, const EvidenceOptions& options);
+
+/// The same for one placement and many rivals, quicker: what the scan says where the placement puts its samples is asked
+/// once. Everything that it is made of must outlive it. Not for two threads at once.
+class ContrastOf {
+ public:
+  ContrastOf(const SizedPose& own, const model::PreparedModel& model, const ScanEvidence& scan,
+             const EvidenceOptions& options);
+  ~ContrastOf();
+  ContrastOf(const ContrastOf&) = delete;
+  ContrastOf& operator=(const ContrastOf&) = delete;
+
+  /// contrast(own, rival), asking no more than the first `most_samples` of those that the options allow.
+  [[nodiscard]] PoseContrast against(const SizedPose& rival,
+                                     std::size_t most_samples = std::numeric_limits<std::size_t>::max());
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
 
 }  // namespace asbuilt::verify

@@ -116,27 +116,27 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
   constexpr double kLeastGain = 2.0;                         // measurements
   constexpr std::size_t kFewSamples = 2000;
   Pose settled = model_from_scan;
-  EvidenceOptions few = options;
-  few.most_samples = std::min(few.most_samples, kFewSamples);
-  const auto gain = [&](const Pose& from, const Pose& to, const EvidenceOptions& how) {
-    const PoseContrast seen = contrast(from, to, model, scan, how);
-    return seen.for_second - seen.for_first;
-  };
+  constexpr std::size_t kAllSamples = std::numeric_limits<std::size_t>::max();
   for (const double step : kSteps) {
     const bool is_coarse = step > kCoarse;
     const Slips kinds = step > kFine ? Slips::single : Slips::combined;
     for (int move = 0; move < kMostMoves; ++move) {
       const Pose here = settled;
+      ContrastOf contrast(here, model, scan, options);
+      const auto gain = [&](const Pose& to, std::size_t most_samples) {
+        const PoseContrast seen = contrast.against(to, most_samples);
+        return seen.for_second - seen.for_first;
+      };
       double most = kLeastGain;
       for (const Pose& slipped : slipped_poses(here, evidence, model, min_held, step * model.diameter, kinds)) {
-        const double gained = gain(here, slipped, is_coarse ? few : options);
+        const double gained = gain(slipped, is_coarse ? kFewSamples : kAllSamples);
         if (gained <= most) continue;
         most = gained;
         settled = slipped;
       }
       if (settled.isApprox(here)) break;
       // A handful of few samples at an edge is chance.
-      if (is_coarse && gain(here, settled, options) <= kLeastGain) {
+      if (is_coarse && gain(settled, kAllSamples) <= kLeastGain) {
         settled = here;
         break;
       }
@@ -146,10 +146,10 @@ Pose settled_between_edges(const Pose& model_from_scan, const PoseEvidence& evid
 }
 
 Slip strongest_slip(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
-                    double min_held, double slip_mm, const ScanEvidence& scan, const EvidenceOptions& options) {
+                    double min_held, double slip_mm, ContrastOf& contrast) {
   Slip strongest;
   for (const Pose& slipped : slipped_poses(model_from_scan, evidence, model, min_held, slip_mm, Slips::combined)) {
-    const PoseContrast seen = contrast(model_from_scan, slipped, model, scan, options);
+    const PoseContrast seen = contrast.against(slipped);
     const double lead = seen.for_first - seen.for_second;
     if (lead < strongest.lead_over_it) strongest = {slipped, lead};
   }

@@ -6,6 +6,7 @@
 
 #include "asbuilt/core/pose.h"
 #include "asbuilt/model/prepared_model.h"
+#include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/evidence.h"
 
 namespace asbuilt::verify {
@@ -38,10 +39,10 @@ struct Slip {
   double lead_over_it = std::numeric_limits<double>::infinity();
 };
 
-/// The slipped pose that comes closest to a pose. Sees what eigenvalues do not: that the sensor looked past the edge at
+/// The slipped pose that comes closest to a pose, of which `contrast` is. Sees what eigenvalues do not: that the sensor looked past the edge at
 /// which the part ends.
 [[nodiscard]] Slip strongest_slip(const Pose& model_from_scan, const PoseEvidence& evidence,
                                   const model::PreparedModel& model, double min_held, double slip_mm,
-                                  const ScanEvidence& scan, const EvidenceOptions& options);
+                                  ContrastOf& contrast);
 
 }  // namespace asbuilt::verify

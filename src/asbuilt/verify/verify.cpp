@@ -454,24 +454,23 @@ class Judge::Verification {
                                      std::span<const Eigen::Vector3f> points_in_scan,
                                      const EvidenceOptions& edge_options) const {
     Slip strongest;
+    ContrastOf contrast(candidate.model_from_scan, model_, evidence_, edge_options);
     const auto consider = [&](const Slip& slip) {
       if (slip.lead_over_it < strongest.lead_over_it) strongest = slip;
     };
     for (const double slip : kSlips) {
       consider(strongest_slip(candidate.model_from_scan, evidence, model_,
-                              hold_needed(candidate.missing_share, options_), slip * model_.diameter, evidence_,
-                              edge_options));
+                              hold_needed(candidate.missing_share, options_), slip * model_.diameter, contrast));
     }
     if (strongest.lead_over_it > 0.0 && std::isfinite(strongest.lead_over_it)) {
-      consider(strongest_far_slip(candidate, evidence, points_in_scan, edge_options));
+      consider(strongest_far_slip(candidate, evidence, points_in_scan, contrast));
     }
     return strongest;
   }
 
   // The same over poses further along the loose directions, each brought onto the surface again.
   [[nodiscard]] Slip strongest_far_slip(const Candidate& candidate, const PoseEvidence& evidence,
-                                        std::span<const Eigen::Vector3f> points_in_scan,
-                                        const EvidenceOptions& edge_options) const {
+                                        std::span<const Eigen::Vector3f> points_in_scan, ContrastOf& contrast) const {
     constexpr std::size_t kMostPoints = 2000;
     constexpr int kMostIterations = 20;
     const auto points = points_in_scan.first(std::min(kMostPoints, points_in_scan.size()));
@@ -485,7 +484,7 @@ class Judge::Verification {
         const Pose there = lm_icp(points, slipped, model_, scan_.viewpoint, {scale_mm, kMostIterations, only_facing()})
                                .model_from_scan;
         if (displacement_modulo_mm(model_from_scan, there, model_) <= kSamePlace * model_.diameter) continue;
-        const PoseContrast seen = contrast(model_from_scan, there, model_, evidence_, edge_options);
+        const PoseContrast seen = contrast.against(there);
         const double lead = seen.for_first - seen.for_second;
         if (lead < strongest.lead_over_it) strongest = {there, lead};
       }

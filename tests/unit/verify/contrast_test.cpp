@@ -46,6 +46,30 @@ TEST(Contrast, DoesNotDependOnTheOrder) {
   EXPECT_EQ(there.for_second, back.for_first);
 }
 
+// Whoever comes first is asked by a search, and the other is spared searches by what they told.
+TEST(Contrast, OfManyRivalsIsThatOfEachAlone) {
+  scan::Scan scan = test::seen({part(), wall()});
+  for (const bool has_viewpoint : {true, false}) {
+    if (!has_viewpoint) scan.viewpoint = {};
+    const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
+    const EvidenceOptions options{0.7, std::max(0.7, 2.5 * scan.spacing_mm)};
+    const Pose own = kScanFromModel.inverse();
+    ContrastOf contrast_of_own(own, plate(), evidence, options);
+    double total = 0.0;
+    for (const double slip_mm : {1.0, -3.0, 8.0, 25.0}) {
+      for (const Eigen::Vector3d& along : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.6, 0.8, 0), Eigen::Vector3d(0, 0, 1)}) {
+        const Pose rival = Eigen::Translation3d(slip_mm * along) * own;
+        const PoseContrast there = contrast_of_own.against(rival);
+        const PoseContrast back = contrast(rival, own, plate(), evidence, options);
+        EXPECT_EQ(there.for_first, back.for_second) << slip_mm << " mm, viewpoint " << has_viewpoint;
+        EXPECT_EQ(there.for_second, back.for_first) << slip_mm << " mm, viewpoint " << has_viewpoint;
+        total += there.total();
+      }
+    }
+    EXPECT_GT(total, 100.0);
+  }
+}
+
 TEST(Contrast, OfAPoseWithItselfIsNothing) {
   const scan::Scan scan = test::seen({part(), wall()});
   EXPECT_EQ(asked(scan, kScanFromModel.inverse(), kScanFromModel.inverse()).total(), 0.0);

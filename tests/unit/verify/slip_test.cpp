@@ -25,7 +25,8 @@ struct Asked : test::Asked {
     return slip(min_held).lead_over_it;
   }
   [[nodiscard]] Slip slip(double min_held) const {
-    return strongest_slip(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, *seen_by, options);
+    ContrastOf contrast(model_from_scan, model, *seen_by, options);
+    return strongest_slip(model_from_scan, evidence, model, min_held, 0.03 * model.diameter, contrast);
   }
   [[nodiscard]] double weakest() const { return weakest_direction(evidence, model, false); }
 };
