@@ -30,7 +30,9 @@ void expect_impossible_values_refused() {
         if (field++ != chosen) return;
         name = field_name;
         using Value = std::remove_reference_t<decltype(value)>;
-        if constexpr (std::is_same_v<Value, int>) {
+        if constexpr (std::is_same_v<Value, bool>) {
+          applies = false;  // neither of its values is impossible
+        } else if constexpr (std::is_same_v<Value, int>) {
           applies = !std::isnan(wrong);
           if (applies) value = static_cast<int>(wrong);
         } else {

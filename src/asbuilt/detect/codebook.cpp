@@ -63,13 +63,13 @@ double longest_pair(const PointCloud& samples, const Context& context) {
 }
 
 // Bin of every ordered pair (kNoBin: left out), row by row.
-std::vector<std::uint32_t> pair_bins(const Codebook& book, const Context& context) {
+std::vector<std::uint32_t> pair_bins(const Codebook& book, bool needs_joint_view, const Context& context) {
   const std::size_t count = book.samples.size();
   std::vector<std::uint32_t> bins(count * count, Quantisation::kNoBin);
   parallel_for(context, count, 8, [&](std::size_t r) {
     for (std::size_t i = 0; i < count; ++i) {
       if (i == r) continue;
-      if (!book.seen_from.empty() && !book.seen_from[r].meets(book.seen_from[i])) continue;
+      if (needs_joint_view && !book.seen_from[r].meets(book.seen_from[i])) continue;
       bins[r * count + i] = book.quantisation.bin(point_pair_feature(
           book.samples.positions[r], book.samples.normals[r], book.samples.positions[i], book.samples.normals[i]));
     }
@@ -183,7 +183,7 @@ Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedMode
   book->longest_pair = longest_pair(model.samples, context);
   for (const Eigen::Vector3f& position : model.samples.positions) book->centre += position.cast<double>();
   book->centre /= static_cast<double>(count);
-  if (!options.paper_mode) {
+  if (!options.paper_mode) {  // for the backs of sheets, too
     book->seen_from = view_masks(model.samples, model, context);
     if (model.is_open()) add_visible_backs(*book, model, context);
   }
@@ -195,8 +195,8 @@ Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedMode
   book->quantisation.angle_bins = options.angle_bins;
   book->quantisation.distance_bins =
       static_cast<int>(book->longest_pair / static_cast<double>(book->quantisation.distance_step)) + 1;
-  fill_entries(*book, pair_bins(*book, context));
-  if (!options.paper_mode) merge_repetitions(*book, options.alpha_bins, context);
+  fill_entries(*book, pair_bins(*book, options.joint_visibility && !book->seen_from.empty(), context));
+  if (options.single_votes) merge_repetitions(*book, options.alpha_bins, context);
   book->bucket_weight = bucket_weights(*book, options.bucket_weight_exponent);
   if (context.cancelled()) return fail(ErrorCode::cancelled, "stopped while building the codebook");
   book->largest_voting_bucket =

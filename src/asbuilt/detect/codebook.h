@@ -66,7 +66,7 @@ struct Codebook {
 };
 
 /// Pairs every sample with every other. Beyond the paper (and not in paper mode), pairs that no single viewpoint sees
-/// have no place in it. Cost: O(N^2) time and 4 N^2 bytes for N samples.
+/// have no place in it (`joint_visibility`). Cost: O(N^2) time and 4 N^2 bytes for N samples.
 /// Errors: invalid_argument for options; not_possible for fewer than 3 or more than 65535 samples.
 [[nodiscard]] Result<std::shared_ptr<const Codebook>> build_codebook(const model::PreparedModel& model,
                                                                      const DetectOptions& options,

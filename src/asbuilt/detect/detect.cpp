@@ -46,7 +46,7 @@ Scene detection_scene(const scan::Scan& scan, const Codebook& codebook, const De
 Scene detection_scene(const scan::Scan& scan, const SampledScan& sampled, const DetectOptions& options) {
   Scene scene{{}, scan.viewpoint, scan.normals_oriented};
   for (std::size_t i = 0; i < sampled.samples.size(); ++i) {
-    if (!options.paper_mode && sampled.on_large_plane[i] != 0) continue;
+    if (options.leave_out_planes && sampled.on_large_plane[i] != 0) continue;
     scene.samples.positions.push_back(sampled.samples.positions[i]);
     scene.samples.normals.push_back(sampled.samples.normals[i]);
   }

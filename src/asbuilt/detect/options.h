@@ -28,6 +28,11 @@ struct DetectOptions {
   double peak_ratio = 0.85;              ///< "close": share of the best maximum's votes
   int last_peaks_per_reference = 20;     ///< the same in the last look, where what agrees from many reference points
   double last_peak_ratio = 0.3;          ///< need be among the best of none
+  bool joint_visibility = true;          ///< pairs that no single viewpoint sees have no place in the codebook
+  bool single_votes = true;              ///< a pair votes once for a model sample and sector of alpha
+  bool leave_out_planes = true;          ///< flat pieces too large for the part take no part
+  bool smooth_maxima = true;             ///< votes are smoothed over the angle, maxima interpolated
+  bool visible_maxima = true;            ///< a maximum counts if its model sample can be seen at that pose
   bool paper_mode = false;               ///< exactly the published method
 
   [[nodiscard]] Result<void> validate() const;
@@ -44,6 +49,11 @@ struct DetectOptions {
     published.last_reference_points = 0;
     published.last_peaks_per_reference = 1;
     published.max_hypotheses = 50;
+    published.joint_visibility = false;
+    published.single_votes = false;
+    published.leave_out_planes = false;
+    published.smooth_maxima = false;
+    published.visible_maxima = false;
     return published;
   }
 };
@@ -75,6 +85,11 @@ void for_each_field(DetectOptions& options, Visitor&& field) {
   field("peak_ratio", options.peak_ratio, "votes of a further maximum / votes of the best");
   field("last_peaks_per_reference", options.last_peaks_per_reference, "maxima kept per reference point in a last look");
   field("last_peak_ratio", options.last_peak_ratio, "votes of a further maximum / votes of the best in a last look");
+  field("joint_visibility", options.joint_visibility, "pairs that no single viewpoint sees do not vote");
+  field("single_votes", options.single_votes, "a pair votes once for a model sample and sector of angle");
+  field("leave_out_planes", options.leave_out_planes, "flat pieces too large for the part do not vote");
+  field("smooth_maxima", options.smooth_maxima, "votes are smoothed over the angle, maxima interpolated");
+  field("visible_maxima", options.visible_maxima, "a maximum counts if its model sample can be seen at that pose");
 }
 
 }  // namespace asbuilt::detect

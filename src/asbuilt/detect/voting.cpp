@@ -84,9 +84,9 @@ std::vector<Peak> LocalVoting::vote(std::uint32_t reference, float sign) {
 
 std::vector<Peak> LocalVoting::peaks(const Pose& scene_frame, const Eigen::Vector3f& reference) const {
   const int bins = options_.alpha_bins;
-  const bool smooth = !options_.paper_mode;
+  const bool smooth = options_.smooth_maxima;
   const Eigen::Vector3d towards_sensor = scene_.viewpoint.towards_sensor(reference.cast<double>());
-  const bool check_view = scene_.viewpoint.known() && !codebook_.seen_from.empty();
+  const bool check_view = options_.visible_maxima && scene_.viewpoint.known() && !codebook_.seen_from.empty();
   const auto count = static_cast<std::size_t>(bins);
   std::vector<float> around(count + 2), values(count);
   std::vector<Peak> best_of_sample;

@@ -184,9 +184,9 @@ TEST(DetectionScene, LeavesTheFloorOutAndKeepsThePart) {
       const Eigen::Vector3f& p = simulated.points_in_scan[i];
       label_of[{p.x(), p.y(), p.z()}] = simulated.labels[i];
     }
-    const auto count = [&](bool paper_mode, std::uint8_t label) {
+    const auto count = [&](bool all, std::uint8_t label) {
       DetectOptions options;
-      options.paper_mode = paper_mode;
+      options.leave_out_planes = !all;
       const Scene scene = detection_scene(scan, *part().book, options, part().context);
       return std::ranges::count_if(scene.samples.positions, [&](const Eigen::Vector3f& p) {
         return label_of.at({p.x(), p.y(), p.z()}) == label;

@@ -107,6 +107,31 @@ TEST(Codebook, LeavesOutPairsThatNoViewpointSees) {
   }
 }
 
+// Of all pairs, those with the same sample in the same sector of the same bucket are one vote, and none is lost.
+TEST(Codebook, HasOneEntryForEachSampleAndSectorOfABucket) {
+  const model::PreparedModel model = test::small_model();
+  DetectOptions options;
+  options.joint_visibility = false;
+  options.single_votes = false;
+  const auto all = build_codebook(model, options, Context(2)).value();
+  EXPECT_EQ(all->entries.size(), all->samples.size() * (all->samples.size() - 1));
+  options.single_votes = true;
+  const auto single = build_codebook(model, options, Context(2)).value();
+  const auto sectors = [&](const Codebook& book, std::uint32_t bin) {
+    std::multiset<std::pair<int, int>> found;
+    for (const Codebook::Entry& entry : book.bucket(bin)) {
+      found.emplace(entry.reference, static_cast<int>(entry.angle / 65536.0 * options.alpha_bins));
+    }
+    return found;
+  };
+  for (std::uint32_t bin = 0; bin < all->quantisation.bin_count(); ++bin) {
+    const auto many = sectors(*all, bin), few = sectors(*single, bin);
+    const std::set<std::pair<int, int>> distinct(many.begin(), many.end());
+    EXPECT_TRUE(std::ranges::equal(few, distinct)) << "bin " << bin;
+  }
+  EXPECT_LT(single->entries.size(), all->entries.size());
+}
+
 TEST(Codebook, ViewMasksNeverSeeASampleFromBehind) {
   const auto book = book_of(test::small_model(), false);
   for (std::size_t i = 0; i < book->samples.size(); ++i) {

@@ -21,6 +21,10 @@ TEST(DetectOptions, AsPublishedAreThoseOfThePaper) {
   EXPECT_EQ(published.peaks_per_reference, 1) << "Eq. 10 has one maximum";
   EXPECT_EQ(published.last_peaks_per_reference, 1);
   EXPECT_EQ(published.max_hypotheses, 50);
+  for (const bool ours : {published.joint_visibility, published.single_votes, published.leave_out_planes,
+                          published.smooth_maxima, published.visible_maxima}) {
+    EXPECT_FALSE(ours);
+  }
   EXPECT_GE(published.reference_points, 400);
   EXPECT_LE(published.reference_points, 1000);
 }
