@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "../program.h"
 #include "asbuilt/io/file.h"
+#include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/ply_writer.h"
 #include "cases.h"
 #include "curves.h"
 #include "parts.h"
@@ -28,6 +31,7 @@ struct Arguments {
   Selection selection;
   std::string mode = "default";
   std::vector<std::string> settings;
+  std::filesystem::path write_scans;  ///< folder; empty: none is written
   std::string only;  ///< group of parts that a summary is about; empty: all that were judged
 };
 
@@ -69,15 +73,31 @@ std::string mode_name(const Arguments& arguments) {
   return name;
 }
 
+/// PART_SEED.ply as `asbuilt detect` reads it, to look at a scan or to judge it alone.
+Result<void> write_scan(const std::filesystem::path& folder, const CaseRecord& record, const CaseScan& scan) {
+  std::vector<float> x, y, z;
+  for (const Eigen::Vector3f& point : scan.points_in_scan.positions) {
+    x.push_back(point.x());
+    y.push_back(point.y());
+    z.push_back(point.z());
+  }
+  const std::vector<io::PlyColumn> columns{{"x", std::span(x)}, {"y", std::span(y)}, {"z", std::span(z)}};
+  return io::write_ply(folder / fmt::format("{}_{}.ply", record.part, record.seed), columns);
+}
+
 Result<void> judge_cases(const Arguments& arguments) {
   ASBUILT_TRY(options, options_of(arguments));
   const Context context(arguments.selection.threads);
   const auto judge_for = [&](const SuitePart& part) -> Result<Judge> {
+    if (!arguments.write_scans.empty()) {
+      ASBUILT_CHECK(io::write_mesh_ply(arguments.write_scans / (part.name + ".ply"), part.mesh));
+    }
     ASBUILT_TRY(made, prepared(part, options, context));
     const auto shared = std::make_shared<const PreparedPart>(std::move(made));
-    return [&, shared](CaseRecord& record, const CaseScan& scan) {
-      const bool is_moved = arguments.mode == "moved";
-      return judge(record, is_moved ? moved(scan, record.seed) : scan, part, *shared, options, context);
+    return [&, shared](CaseRecord& record, const CaseScan& simulated) -> Result<void> {
+      const CaseScan scan = arguments.mode == "moved" ? moved(simulated, record.seed) : simulated;
+      if (!arguments.write_scans.empty()) ASBUILT_CHECK(write_scan(arguments.write_scans, record, scan));
+      return judge(record, scan, part, *shared, options, context);
     };
   };
   return run_cases(arguments.selection, mode_name(arguments), judge_for, context);
@@ -155,6 +175,8 @@ int run(int argc, char** argv) {
       ->check(CLI::IsMember({"default", "moved", "none", "paper"}))
       ->capture_default_str();
   cases->add_option("--set", arguments.settings, "NAME=VALUE for any option of the product, for ablations");
+  cases->add_option("--write", arguments.write_scans, "folder for the scans themselves, as PART_SEED.ply, and the part, PART.ply")
+      ->check(CLI::ExistingDirectory);
   CLI::App* summary = app.add_subcommand("summary", "Figures of OUT/cases.jsonl: summary.json, summary.md, curves");
   summary->add_option("output", selection.output, "OUT")->required();
   summary->add_option("--data", selection.data, "as for cases; --only needs it");
