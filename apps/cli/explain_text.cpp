@@ -132,6 +132,10 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
         "tells{}.\n",
         100.0 * best.lost_end_share, percent_allowed(record, "max_lost_end_share"));
   }
+  if (best.pierced_share > 0.0) {  // NaN: from an older run
+    text += fmt::format("  Flat surfaces: {:.0f} % of the part would lie behind one that it would reach through{}.\n",
+                        100.0 * best.pierced_share, percent_allowed(record, "max_pierced_share"));
+  }
   if (std::isnan(best.overrun_share)) return text;
   text += fmt::format("  Edges: past {:.0f} % of the part's edges the surface goes on{}.\n", 100.0 * best.overrun_share,
                       percent_allowed(record, "max_overrun_share"));

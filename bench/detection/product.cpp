@@ -32,6 +32,10 @@ void note(CaseRecord& record, const verify::Detection& detection) {
   record.residual_ratio = best.residual_ratio;
   record.weakest_direction = best.weakest_direction;
   record.slip_lead = best.slip_lead;
+  record.size_hold = best.size_hold;
+  record.size_lead = best.size_lead;
+  record.lost_end_share = best.lost_end_share;
+  record.pierced_share = best.pierced_share;
   record.loose_directions = best.loose_directions;
   record.overrun_share = best.overrun_share;
   record.explained_samples = best.explained_samples;

@@ -56,6 +56,10 @@ void for_each_field(Record& record, Visitor&& field) {
   field("residual_ratio", record.residual_ratio);
   field("weakest_direction", record.weakest_direction);
   field("slip_lead", record.slip_lead);
+  field("size_hold", record.size_hold);
+  field("size_lead", record.size_lead);
+  field("lost_end_share", record.lost_end_share);
+  field("pierced_share", record.pierced_share);
   field("overrun_share", record.overrun_share);
   field("explained_samples", record.explained_samples);
   field("loose_directions", record.loose_directions);

@@ -79,6 +79,7 @@ Json json_of(const CandidateRecord& candidate) {
           {"size_hold", json_number(candidate.size_hold)},
           {"size_lead", json_number(candidate.size_lead)},
           {"lost_end_share", json_number(candidate.lost_end_share)},
+          {"pierced_share", json_number(candidate.pierced_share)},
           {"overrun_share", json_number(candidate.overrun_share)},
           {"objection", candidate.objection}};
 }
@@ -262,6 +263,7 @@ CandidateRecord candidate_of(const Json& json) {
   candidate.size_hold = later_number_at(json, "size_hold");
   candidate.size_lead = later_number_at(json, "size_lead");
   candidate.lost_end_share = later_number_at(json, "lost_end_share");
+  candidate.pierced_share = later_number_at(json, "pierced_share");
   candidate.overrun_share = later_number_at(json, "overrun_share");
   candidate.objection = json.value("objection", "");
   return candidate;

@@ -51,6 +51,7 @@ struct CandidateRecord {
   double slip_lead = kNotTold;          ///< measurements by which the pose leads over the small slip that comes closest
   double size_hold = kNotTold;          ///< how firmly that surface holds the part's size
   double size_lead = kNotTold;          ///< measurements by which the pose leads over the part in another size
+  double pierced_share = kNotTold;      ///< of the part, what lies behind a flat surface that it would reach through
   double lost_end_share = kNotTold;     ///< of what was looked at, at an end of unknown place, where nothing came back
   double overrun_share = kNotTold;      ///< of the part's edges, those past which the scan's surface goes on
   std::string objection;                ///< reason code of what stands against it on its own; empty: nothing

@@ -132,6 +132,7 @@ io::CandidateRecord recorded(const verify::Candidate& candidate, const Eigen::Ve
   record.size_hold = candidate.size_hold;
   record.size_lead = candidate.size_lead;
   record.lost_end_share = candidate.lost_end_share;
+  record.pierced_share = candidate.pierced_share;
   record.overrun_share = candidate.overrun_share;
   record.objection = verify::code_of(candidate.objection);
   return record;

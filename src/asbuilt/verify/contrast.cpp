@@ -67,7 +67,11 @@ class ContrastOf::Implementation {
  public:
   Implementation(const SizedPose& own, const model::PreparedModel& model, const ScanEvidence& scan,
                  const EvidenceOptions& options)
-      : model_(model), scan_(scan), options_(options), own_(own, scan.scan.viewpoint), answers_(model.dense_samples.size()) {}
+      : model_(model),
+        scan_(scan),
+        options_(options),
+        own_(own, scan.scan.viewpoint),
+        answers_(model.dense_samples.size()) {}
 
   [[nodiscard]] PoseContrast against(const SizedPose& rival_pose, std::size_t most_samples) {
     const double spacing_mm = 0.5 * (spacing_at(own_.sized.model_from_scan, model_, scan_.scan) +

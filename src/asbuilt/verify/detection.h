@@ -52,6 +52,7 @@ struct Candidate {
   double size_lead = 0.0;    ///< measurements by which it leads over the part in another size; asked where it does not
   double lost_end_share =
       0.0;                     ///< of what was looked at, at an end of unknown place, where nothing came back; see docs
+  double pierced_share = 0.0;  ///< of the part, what lies behind a flat surface that it would reach through
   double overrun_share = 0.0;  ///< share of the model's edges past which the scan's surface simply goes on
   int explained_samples = 0;   ///< model samples that the scan confirms
   double explained_measurements = 0.0;  ///< the same in measurements that count singly, as slip_lead does

@@ -173,6 +173,12 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
                         "% are allowed: something shorter would look the same",
                         100.0 * c.lost_end_share, 100.0 * options.max_lost_end_share)};
   }
+  if (!options.paper_mode && c.pierced_share > options.max_pierced_share) {
+    return {Reason::under_constrained,
+            fmt::format("{:.0f} % of the part would lie behind a flat surface that is not its own, through which it "
+                        "would have to reach (at most {:.0f} % are allowed where edges hold the pose or the size)",
+                        100.0 * c.pierced_share, 100.0 * options.max_pierced_share)};
+  }
   if (c.normal_agreement < options.min_normal_agreement) {
     return {Reason::normals_disagree, fmt::format("{:.0f} % of the normals agree with the model, {:.0f} % are needed",
                                                   100.0 * c.normal_agreement, 100.0 * options.min_normal_agreement)};

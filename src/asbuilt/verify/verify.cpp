@@ -19,6 +19,7 @@
 #include "asbuilt/verify/lm_icp.h"
 #include "asbuilt/verify/lost_end.h"
 #include "asbuilt/verify/near_poses.h"
+#include "asbuilt/verify/pierced_plane.h"
 #include "asbuilt/verify/rim.h"
 #include "asbuilt/verify/segment.h"
 #include "asbuilt/verify/size.h"
@@ -409,6 +410,9 @@ class Judge::Verification {
     if (scan_.viewpoint.known() && candidate.missing_share > options_.max_lost_end_share && is_plausible()) {
       candidate.lost_end_share = lost_end_share(candidate.model_from_scan, model_, evidence_, options);
     }
+    if ((is_loose() || candidate.size_hold < hold) && is_plausible()) {
+      candidate.pierced_share = pierced_share(candidate.model_from_scan, model_, scan_, final_distance);
+    }
   }
 
   void cut_out(Detection& detection) const {
@@ -648,6 +652,7 @@ Result<void> VerifyOptions::validate() const {
   ASBUILT_CHECK(expect_between("max_overrun_share", max_overrun_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_joint_denial", max_joint_denial, 0.0, 2.0));
   ASBUILT_CHECK(expect_between("max_lost_end_share", max_lost_end_share, 0.0, 1.0));
+  ASBUILT_CHECK(expect_between("max_pierced_share", max_pierced_share, 0.0, 1.0));
   ASBUILT_CHECK(expect_between("max_normal_angle_deg", max_normal_angle_deg, 1.0, 180.0));
   return {};
 }

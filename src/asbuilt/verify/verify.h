@@ -41,6 +41,7 @@ struct VerifyOptions {
   double max_overrun_share = 0.12;  ///< of the edges past which the scan's surface may go on
   double max_joint_denial =
       1.0;  ///< contradictions and overrun, each as a share of its limit, together: right poses hardly exceed 0.8
+  double max_pierced_share = 0.1;      ///< of the part, that may reach through a flat surface not its own
   double max_lost_end_share = 0.03;    ///< of what was looked at, at an end of unknown place, where nothing came back
   double max_normal_angle_deg = 30.0;  ///< normals closer than this agree
   bool is_one_of_many = false;         ///< set by a patient look: of so many poses that are tried, more is asked
@@ -92,6 +93,8 @@ void for_each_field(VerifyOptions& options, Visitor&& field) {
         "sum of contradictions and overrun, each as a share of its limit");
   field("max_lost_end_share", options.max_lost_end_share,
         "share of the claimed surface that may lie at an end of unknown place and have returned nothing");
+  field("max_pierced_share", options.max_pierced_share,
+        "share of the part that may reach through a flat surface not its own where edges hold its pose or size");
   field("max_normal_angle_deg", options.max_normal_angle_deg, "normals closer than this agree");
 }
 

@@ -49,6 +49,7 @@ RunRecord example() {
   scan.candidates[1].weakest_direction = 0.01, scan.candidates[1].slip_lead = -3.5;
   scan.candidates[1].size_hold = 0.002, scan.candidates[1].size_lead = 12.5;
   scan.candidates[1].lost_end_share = 0.0625;
+  scan.candidates[1].pierced_share = 0.125;
   scan.candidates[1].overrun_share = 0.125, scan.candidates[1].objection = "low_score";
   scan.instance = 2, scan.instances_in_scan = 3;
   scan.segment_points = 5;
@@ -79,7 +80,7 @@ TEST(RunRecord, ComesBackExactlyAsItWasWritten) {
 TEST(RunRecord, OfAnEarlierVersionIsReadWithoutTheFieldsThatCameLater) {
   std::string text = to_json(example());
   for (const char* later : {"instance", "instances_in_scan", "facing_share", "found_share", "contradiction_share",
-                            "missing_share", "residual_ratio", "weakest_direction", "slip_lead", "size_hold", "size_lead", "lost_end_share",
+                            "missing_share", "residual_ratio", "weakest_direction", "slip_lead", "size_hold", "size_lead", "lost_end_share", "pierced_share",
                             "overrun_share",
                             "objection", "hold_sigma", "loose_motions", "links"}) {
     const std::string key = std::string("\"") + later + "\":";

@@ -57,7 +57,8 @@ TEST(Contrast, OfManyRivalsIsThatOfEachAlone) {
     ContrastOf contrast_of_own(own, plate(), evidence, options);
     double total = 0.0;
     for (const double slip_mm : {1.0, -3.0, 8.0, 25.0}) {
-      for (const Eigen::Vector3d& along : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.6, 0.8, 0), Eigen::Vector3d(0, 0, 1)}) {
+      for (const Eigen::Vector3d& along :
+           {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.6, 0.8, 0), Eigen::Vector3d(0, 0, 1)}) {
         const Pose rival = Eigen::Translation3d(slip_mm * along) * own;
         const PoseContrast there = contrast_of_own.against(rival);
         const PoseContrast back = contrast(rival, own, plate(), evidence, options);

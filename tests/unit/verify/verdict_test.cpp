@@ -56,6 +56,7 @@ TEST(Verdict, GivesEachReasonToTheCandidateThatDeservesIt) {
       {Reason::contradicted, [](Candidate& c) { c.contradiction_share = 0.3; }},
       {Reason::under_constrained, [](Candidate& c) { c.weakest_direction = 0.0; }},
       {Reason::under_constrained, [](Candidate& c) { c.lost_end_share = 0.2; }},
+      {Reason::under_constrained, [](Candidate& c) { c.pierced_share = 0.2; }},
       {Reason::normals_disagree, [](Candidate& c) { c.normal_agreement = 0.4; }},
       {Reason::weak_evidence,  // 0.75 * 0.78 * (1 - 0.34 / 0.577) = 0.24
        [](Candidate& c) { c.score = 0.75, c.normal_agreement = 0.78, c.residual_ratio = 0.34; }}};
