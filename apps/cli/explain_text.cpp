@@ -123,7 +123,7 @@ std::string quality_sentences(const io::RunRecord& record, const io::CandidateRe
   if (!std::isnan(best.size_hold) && least && best.size_hold < needed) {
     text += fmt::format(
         "  Size: the surface that was found would be the same on a larger or smaller part; its edges: {:.0f} "
-        "measurements more than for one a tenth larger or smaller.\n",
+        "measurements more than for one of another size.\n",
         best.size_lead);
   }
   if (best.lost_end_share > 0.0) {  // NaN: from an older run

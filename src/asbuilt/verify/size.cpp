@@ -10,7 +10,9 @@
 namespace asbuilt::verify {
 namespace {
 
-constexpr double kSizes[] = {0.9, 1.1};
+// Edges feigned by other things may lead over a copy a tenth off, but not over one of the size that is there: of a
+// cylinder's side, what a third of the radius changes is within as-built deviations.
+constexpr double kSizes[] = {0.7, 0.8, 0.9, 1.1, 1.25, 1.4};
 
 // Directions in which nothing holds the part are left as they are.
 double ridge(const PoseEvidence& evidence) {

@@ -12,9 +12,9 @@ namespace asbuilt::verify {
 /// that meet in a corner, which are those of a block of any size. The counterpart of PoseEvidence::weakest_direction.
 [[nodiscard]] double size_hold(const PoseEvidence& evidence);
 
-/// By how many measurements the pose leads over copies of the part a tenth smaller and larger that lie on the same
-/// surface (see contrast()): whether its far edges were seen. The lesser of the two; negative if such a copy explains
-/// the scan better.
+/// By how many measurements the pose leads over copies of the part, one to three tenths smaller and one to four tenths
+/// larger, that lie on the same surface (see contrast()): whether its far edges were seen. The least of them; negative if
+/// such a copy explains the scan better.
 [[nodiscard]] double size_lead(const Pose& model_from_scan, const PoseEvidence& evidence,
                                const model::PreparedModel& model, const ScanEvidence& scan,
                                const EvidenceOptions& options);

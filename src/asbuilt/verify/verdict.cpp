@@ -162,7 +162,7 @@ Finding objection(const Candidate& c, const VerifyOptions& options) {
   }
   if (!options.paper_mode && !is_of_this_size(c, options)) {
     return {Reason::under_constrained,
-            fmt::format("the part a tenth smaller or larger would lie on the surface that was found as well (its size is "
+            fmt::format("the part in another size would lie on the surface that was found as well (its size is "
                         "held by {:.4f}, {:.4f} needed), and {:.0f} measurements at its edges tell ({:.0f} needed)",
                         c.size_hold, hold_needed(c.missing_share, options), std::max(0.0, c.size_lead),
                         size_measurements_needed(c, options))};

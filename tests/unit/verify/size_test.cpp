@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "asbuilt/verify/contrast.h"
@@ -86,6 +87,25 @@ TEST(SizeLead, IsNoneWhereTheFarEdgesAreHidden) {
   EXPECT_GT(right.evidence.explained_samples, 100U);
   EXPECT_LT(size_hold(right.evidence), kLimits.min_weakest_direction);
   EXPECT_LT(right.lead(), kLimits.min_contrast);
+}
+
+// Of the rounded side of a can, a part is in sight, and of its upper rim: a can a third larger, laid onto them, loses.
+TEST(SizeLead, TellsARoundPartFromWhatIsMuchSmaller) {
+  const auto upright = [](double radius, double height) {
+    Pose scan_from_model(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitX()));
+    scan_from_model.translation() = Eigen::Vector3d(0, 0.5 * height - 75, 600 + radius);
+    return scan_from_model;
+  };
+  const std::vector<TriangleMesh> screens{test::plate_at({400, 200, 1}, {0, 100 + 15, 400}),
+                                          test::plate_at({200, 400, 1}, {-100 - 12, 0, 410})};
+  const test::Asked wrong(test::prepared(simulate::cylinder(60.0, 200.0)), upright(60.0, 200.0).inverse(),
+                          test::with(screens, simulate::cylinder(45.0, 150.0), upright(45.0, 150.0)), 0.25);
+  EXPECT_LT(size_hold(wrong.evidence), kLimits.min_weakest_direction);
+  EXPECT_LT(size_lead(wrong.model_from_scan, wrong.evidence, wrong.model, *wrong.seen_by, wrong.options), 0.0);
+  const test::Asked right(test::prepared(simulate::cylinder(60.0, 200.0)), upright(60.0, 200.0).inverse(),
+                          test::with(screens, simulate::cylinder(60.0, 200.0), upright(60.0, 200.0)), 0.25);
+  EXPECT_GT(size_lead(right.model_from_scan, right.evidence, right.model, *right.seen_by, right.options),
+            kLimits.min_contrast);
 }
 
 TEST(SizedPose, KeepsItsFixedPointAndScalesAllDistancesFromIt) {
