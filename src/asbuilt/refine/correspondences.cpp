@@ -71,6 +71,30 @@ float weight_of(std::uint32_t source, std::uint32_t target, const SampledView& f
   return weight / (1.0F + along * along);
 }
 
+// The point of the face across the edge at which a face of the source ends, if the target saw both; or kNone.
+std::uint32_t across_edge(std::size_t rim, const SampledView& from, const SampledView& to, const Pose& to_from_from,
+                          double reach_mm) {
+  constexpr float kBehind = 3.0F;         // spacings from the edge: normals are of one face alone
+  constexpr float kLeastBehind = 1.5F;    // spacings
+  constexpr float kAside = 2.5F;          // spacings that the face may be off the place where it is looked for
+  constexpr float kSameFace = 0.9F;       // cosine
+  constexpr float kFacesOutwards = 0.7F;  // cosine: the face across the edge looks out of the face that ends
+  constexpr float kOtherFace = 0.6F;      // cosine
+  const Eigen::Matrix3f turn = to_from_from.linear().cast<float>();
+  const Eigen::Vector3f end = (to_from_from * from.rims.ends.positions[rim].cast<double>()).cast<float>();
+  const Eigen::Vector3f outward = turn * from.rims.ends.normals[rim], normal = turn * from.rims.face_normals[rim];
+  const auto spacing = static_cast<float>(to.spacing_mm);
+  const float aside = kAside * spacing + static_cast<float>(reach_mm);
+  const KdTree::Neighbour same =
+      to.tree->nearest_facing(end - kBehind * spacing * outward, aside, to.points.normals, normal, kSameFace);
+  if (!same.found()) return KdTree::kNone;
+  const KdTree::Neighbour other =
+      to.tree->nearest_facing(end - kBehind * spacing * normal, aside, to.points.normals, outward, kFacesOutwards);
+  if (!other.found() || std::abs(to.points.normals[other.index].dot(normal)) > kOtherFace) return KdTree::kNone;
+  if (normal.dot(to.points.positions[other.index] - end) > -kLeastBehind * spacing) return KdTree::kNone;
+  return other.index;
+}
+
 struct Task {
   std::size_t edge, begin, end;
 };
@@ -127,6 +151,30 @@ std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const Sampl
     }
   });
   return due.size();
+}
+
+void find_rim_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views, std::span<const Pose> poses,
+                      const MatchRules& rules, const Context& context) {
+  parallel_for(context, edges.size(), 1, [&](std::size_t e) {
+    DirectedEdge& edge = edges[e];
+    const Pose now = target_from_source(edge, poses);
+    if (context.cancelled() || may_keep(edge, now, views, rules)) return;
+    edge.target_from_source = now;
+    edge.searched_reach_mm = edge.reach_mm;
+    edge.searched_coarse = rules.coarse;
+    edge.searched = true;
+    edge.matches.clear();
+    const SampledView& from = view_at(views, edge.source);
+    const SampledView& to = view_at(views, edge.target);
+    const double noise = squared(from.noise_sigma_mm) + squared(to.noise_sigma_mm);
+    const double floor = squared(0.01 * to.spacing_mm);
+    const double gap = squared(from.spacing_mm) / 12.0;  // variance of where a face ends within a spacing
+    const auto weight = static_cast<float>((noise + floor) / (noise + floor + gap));
+    for (std::size_t i = 0; i < from.rims.ends.size(); ++i) {
+      const std::uint32_t target = across_edge(i, from, to, now, edge.reach_mm);
+      if (target != KdTree::kNone) edge.matches.push_back({static_cast<std::uint32_t>(i), target, weight});
+    }
+  });
 }
 
 ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const SampledView> views,

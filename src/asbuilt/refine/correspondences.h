@@ -26,6 +26,7 @@ struct DirectedEdge {
   double weight = 1.0;         ///< of every residual, from the variance of the edge
   double normal_spread = 0.0;  ///< median sine between the normals of a match
   std::vector<Match> matches;  ///< by increasing source
+  bool of_rims = false;        ///< sources are ends of faces of the view (rim_points.h), targets lie across the edge
 
   // Where they were searched; find_matches keeps them while the views have hardly moved against one another since.
   Pose target_from_source = Pose::Identity();
@@ -46,6 +47,11 @@ struct MatchRules {
 /// finds the same. Stops early, with matches missing, when the context is cancelled.
 std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views,
                          std::span<const Pose> poses, const MatchRules& rules, const Context& context);
+
+/// The same for edges of rims: the end of a face of the source is held against the face across that edge, where the
+/// target saw both. The plane is taken some spacings behind the edge, where its normal does not lean.
+void find_rim_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views, std::span<const Pose> poses,
+                      const MatchRules& rules, const Context& context);
 
 /// Robust statistics of an edge's matches: 1.4826 x median absolute residual, and median sine between normals.
 struct ResidualStatistics {

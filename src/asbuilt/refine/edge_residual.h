@@ -14,12 +14,13 @@ class EdgeResidualFunction {
  public:
   EdgeResidualFunction(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
                        const Eigen::Vector3d& origin, bool symmetric)
-      : source_(views[static_cast<std::size_t>(edge.source)].points),
+      : source_(edge.of_rims ? views[static_cast<std::size_t>(edge.source)].rims.ends
+                             : views[static_cast<std::size_t>(edge.source)].points),
         target_(views[static_cast<std::size_t>(edge.target)].points),
         source_pose_(poses[static_cast<std::size_t>(edge.source)]),
         target_pose_(poses[static_cast<std::size_t>(edge.target)]),
         origin_(origin),
-        symmetric_(symmetric) {}
+        symmetric_(symmetric && !edge.of_rims) {}
 
   [[nodiscard]] Eigen::Vector3d position(const Match& match) const {
     return source_pose_ * source_.positions[match.source].cast<double>() - origin_;

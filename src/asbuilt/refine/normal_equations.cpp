@@ -119,24 +119,44 @@ LocalInformation local_information(const EdgeSums& both_ways, const Scaling& sca
   return local;
 }
 
-LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling, double threshold) {
-  LinkBlock held = link;
-  held.information.setZero();
-  held.gradient.setZero();
-  const LocalInformation local = local_information(both_ways, scaling);
-  if (!(local.radius_mm > 0.0)) return held;  // a single point holds nothing worth having
-  if (local.held[0] >= threshold) return link;
+namespace {
 
-  Matrix6d projector = Matrix6d::Zero();
+// The directions that are held with at least `threshold`, or the others.
+Matrix6d projector(const LocalInformation& local, double threshold, bool held) {
+  Matrix6d sum = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    if (local.held[i] < threshold) continue;
-    projector += local.motions.col(i) * local.motions.col(i).transpose();
+    if ((local.held[i] >= threshold) == held) sum += local.motions.col(i) * local.motions.col(i).transpose();
   }
+  return sum;
+}
+
+LinkBlock projected(const LinkBlock& link, const LocalInformation& local, const Matrix6d& projector) {
   // Of twists; its transpose acts on gradients.
   const Matrix6d kept = local.scaled_from_local * projector * local.scaled_from_local.inverse();
-  held.gradient = kept.transpose() * link.gradient;
-  held.information = kept.transpose() * link.information * kept;
-  return held;
+  LinkBlock part = link;
+  part.gradient = kept.transpose() * link.gradient;
+  part.information = kept.transpose() * link.information * kept;
+  return part;
+}
+
+}  // namespace
+
+LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling, double threshold) {
+  const LocalInformation local = local_information(both_ways, scaling);
+  if (!(local.radius_mm > 0.0)) {  // a single point holds nothing worth having
+    LinkBlock nothing = link;
+    nothing.information.setZero();
+    nothing.gradient.setZero();
+    return nothing;
+  }
+  if (local.held[0] >= threshold) return link;
+  return projected(link, local, projector(local, threshold, true));
+}
+
+LinkBlock part_not_held_by(const EdgeSums& both_ways, const LinkBlock& link, const Scaling& scaling, double threshold) {
+  const LocalInformation local = local_information(both_ways, scaling);
+  if (!(local.radius_mm > 0.0)) return link;
+  return projected(link, local, projector(local, threshold, false));
 }
 
 int NormalEquations::unknown_of(int view) const {

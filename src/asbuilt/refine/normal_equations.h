@@ -71,6 +71,10 @@ struct LocalInformation {
 [[nodiscard]] LinkBlock held_part(const LinkBlock& link, const EdgeSums& both_ways, const Scaling& scaling,
                                   double threshold);
 
+/// What is left of a link in the directions that `both_ways`, other matches of it, hold with less than `threshold`.
+[[nodiscard]] LinkBlock part_not_held_by(const EdgeSums& both_ways, const LinkBlock& link, const Scaling& scaling,
+                                         double threshold);
+
 /// What the matches of one link in one cube of space say: their share of the gradient of Eq. 5, by the pose of `first`.
 struct CellGradient {
   std::uint32_t cell = 0;  ///< numbers from 0 on; a cube has the same number for all links

@@ -31,6 +31,7 @@ constexpr double kMinWeight = 1e-3;       // of an edge whose residuals are wide
 constexpr double kCoarseMotion = 0.5;     // in units of noise: near enough for the full sample
 constexpr double kHeldInSpreads = 1.0;    // squared spreads of the normals that an edge must hold more than
 constexpr double kMinHeld = 1e-7, kMaxHeld = 5e-3;  // bounds of the rank threshold of an edge
+constexpr double kHeldByFaces = 0.01;               // where ends of faces have no say
 constexpr double kAlikeInRadii = 0.4;               // of a view: so far apart, errors of matches have little in common
 constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
@@ -127,7 +128,7 @@ class JointRefinement {
 
   void sample(std::span<const View> views) {
     const SamplingRules rules{static_cast<std::size_t>(options_.points_per_scan), kCoarsePoints, options_.face_normals,
-                              options_.rim_weights};
+                              options_.rim_weights, options_.rim_matches};
     views_.resize(views.size());
     parallel_for(context_, views.size(), 1, [&](std::size_t v) {
       views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, rules, context_);
@@ -160,6 +161,8 @@ class JointRefinement {
         edge.target = to;
         edge.reach_mm = start_reach();
         edges_.push_back(edge);
+        edge.of_rims = true;
+        if (options_.rim_matches) rim_edges_.push_back(edge);
       }
     }
   }
@@ -209,6 +212,29 @@ class JointRefinement {
       edges_[e].weight = options_.edge_weights ? std::clamp(ratio, kMinWeight, 1.0 / kMinWeight) : 1.0;
     }
     return searched;
+  }
+
+  // Weight and scale are those of the edge's other matches. A scale of its own would be wider, as a face ends anywhere
+  // within a spacing, and would believe rims that are no ends of faces.
+  void match_rims(bool coarse, bool afresh) {
+    for (std::size_t e = 0; e < rim_edges_.size(); ++e) {
+      rim_edges_[e].reach_mm = edges_[e].reach_mm;
+      // While the reach shrinks, nothing else may hold the views where these matches lead them.
+      const double to_go = edges_[e].reach_mm - kReachInSpacings * target(edges_[e]).spacing_mm;
+      rim_edges_[e].scale_mm = std::max(edges_[e].scale_mm, to_go);
+      rim_edges_[e].weight = edges_[e].weight;
+    }
+    MatchRules matching = rules(coarse);
+    if (options_.keep_matches && !afresh) matching.keep_spacings = kKeepSpacings;
+    find_rim_matches(rim_edges_, views_, poses_, matching, context_);
+  }
+
+  [[nodiscard]] std::vector<EdgeSums> linearised(std::span<const DirectedEdge> edges) const {
+    return linearise(edges, views_, poses_, scaling_, options_.symmetric, context_);
+  }
+
+  [[nodiscard]] double cost_at(std::span<const Pose> poses) const {
+    return total_cost(edges_, views_, poses, options_.symmetric, context_);
   }
 
   // From the misalignment to the noise: the reach follows the residuals down, edge by edge.
@@ -261,13 +287,31 @@ class JointRefinement {
     return std::clamp(kHeldInSpreads * squared(spread), kMinHeld, kMaxHeld);
   }
 
-  [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums) const {
+  // What ends of faces say of each link. Where its faces hold, they know better: an end is told to a fraction of a
+  // spacing only.
+  [[nodiscard]] std::vector<LinkBlock> rim_blocks(std::span<const EdgeSums> sums,
+                                                  std::span<const EdgeSums> rim_sums) const {
+    std::vector<LinkBlock> blocks;
+    if (rim_sums.empty()) return blocks;
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const LinkBlock ends{links_[l].first, links_[l].second, both_ways(l, rim_sums).information,
+                           rim_sums[2 * l].gradient - rim_sums[2 * l + 1].gradient, 0.0};
+      blocks.push_back(part_not_held_by(both_ways(l, sums), ends, scaling_, kHeldByFaces));
+    }
+    return blocks;
+  }
+
+  [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums,
+                                                 std::span<const LinkBlock> rim_blocks) const {
     std::vector<LinkBlock> blocks;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       const EdgeSums both = both_ways(l, sums);
       const LinkBlock block{links_[l].first, links_[l].second, both.information,
                             sums[2 * l].gradient - sums[2 * l + 1].gradient, both.weight};
       blocks.push_back(options_.drop_unheld ? held_part(block, both, scaling_, held_threshold(l)) : block);
+      if (rim_blocks.empty()) continue;
+      blocks.back().information += rim_blocks[l].information;
+      blocks.back().gradient += rim_blocks[l].gradient;
     }
     return {static_cast<int>(views_.size()), fixed_, blocks};
   }
@@ -299,14 +343,28 @@ class JointRefinement {
     return largest;
   }
 
+  // How a step changes the cost of what `blocks` say, to second order. Of the residuals of rims only a part has a say;
+  // the whole of them would turn down steps that faces ask for.
+  [[nodiscard]] static double modelled_change(std::span<const LinkBlock> blocks,
+                                              std::span<const Vector6d> scaled_step) {
+    double change = 0.0;
+    for (const LinkBlock& block : blocks) {
+      const Vector6d relative =
+          scaled_step[static_cast<std::size_t>(block.first)] - scaled_step[static_cast<std::size_t>(block.second)];
+      change += relative.dot(2.0 * block.gradient + block.information * relative);
+    }
+    return change;
+  }
+
   // One Levenberg-Marquardt step for the current matches; `motion` is what it moved.
-  Outcome take_step(const NormalEquations& equations, double cost, double& motion) {
+  Outcome take_step(const NormalEquations& equations, std::span<const LinkBlock> rim_blocks, double cost,
+                    double& motion) {
     motion = 0.0;
     for (int attempt = 0; attempt < 8; ++attempt) {
       const std::vector<Vector6d> step = equations.step(damping_, options_.paper_mode);
       if (!step.empty()) {
         const std::vector<Pose> candidate = moved(step);
-        if (total_cost(edges_, views_, candidate, options_.symmetric, context_) < cost) {
+        if (cost_at(candidate) + modelled_change(rim_blocks, step) < cost) {
           motion = largest_motion(step);
           poses_ = candidate;
           damping_ = std::max(0.1 * damping_, 1e-9);
@@ -327,7 +385,8 @@ class JointRefinement {
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
       const std::size_t searched = match_and_scale(coarse, iteration == 0, afresh);
       if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
-      const std::vector<EdgeSums> sums = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
+      match_rims(coarse, afresh);
+      const std::vector<EdgeSums> sums = linearised(edges_), rim_sums = linearised(rim_edges_);
       EdgeSums total;
       for (const EdgeSums& sum : sums) total += sum;
       if (!(total.weight > 0.0)) {
@@ -337,7 +396,8 @@ class JointRefinement {
       }
       if (iteration == 0) result.rms_before_mm = pooled_rms(sums);
       double motion = 0.0;
-      const Outcome outcome = take_step(normal_equations(sums), total.cost, motion);
+      const std::vector<LinkBlock> rims = rim_blocks(sums, rim_sums);
+      const Outcome outcome = take_step(normal_equations(sums, rims), rims, total.cost, motion);
       result.iterations = iteration + 1;
       context_.report_progress(static_cast<double>(iteration + 1) / static_cast<double>(options_.max_iterations + 1));
 
@@ -360,17 +420,19 @@ class JointRefinement {
   // Everything that is said about the final poses.
   Result<void> conclude(Refinement& result) {
     find_matches(edges_, views_, poses_, rules(false), context_);
-    const std::vector<EdgeSums> sums = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
+    match_rims(false, true);
+    const std::vector<EdgeSums> sums = linearised(edges_), rim_sums = linearised(rim_edges_);
     if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
     result.rms_after_mm = pooled_rms(sums);
     describe_edges(sums, result);
-    const std::vector<Matrix6d> strewn = strewn_blocks(sums);
+    const std::vector<Matrix6d> strewn = strewn_blocks(sums, rim_sums);
     // A doubtful match is biased rather than noisy: its small weight would make the pose look as if nothing held it.
     for (DirectedEdge& edge : edges_) {
       for (Match& match : edge.matches) match.weight = 1.0F;
     }
-    const std::vector<EdgeSums> plain = linearise(edges_, views_, poses_, scaling_, options_.symmetric, context_);
-    describe_uncertainty(normal_equations(plain), plain, unit_variance(plain), strewn, result);
+    const std::vector<EdgeSums> plain = linearised(edges_);
+    describe_uncertainty(normal_equations(plain, rim_blocks(plain, rim_sums)), plain, unit_variance(plain), strewn,
+                         result);
     for (std::size_t l = 0; l < links_.size(); ++l) result.link_holds.push_back(hold_of_link(l, both_ways(l, plain)));
     return {};
   }
@@ -403,7 +465,8 @@ class JointRefinement {
 
   // How far the poses would be strewn by errors that are alike within a part of a view, and different from one such
   // part to the next. In scaled twists.
-  [[nodiscard]] std::vector<Matrix6d> strewn_blocks(std::span<const EdgeSums> sums) const {
+  [[nodiscard]] std::vector<Matrix6d> strewn_blocks(std::span<const EdgeSums> sums,
+                                                    std::span<const EdgeSums> rim_sums) const {
     std::vector<double> radii;
     for (const SampledView& view : views_) radii.push_back(view.radius_mm);
     const double cell_mm = std::max(kAlikeInRadii * median_of(std::move(radii)), 1e-6 * scaling_.length_mm);
@@ -416,7 +479,17 @@ class JointRefinement {
         cell.gradient = held_part(part, both_ways(cell.link, sums), scaling_, held_threshold(cell.link)).gradient;
       }
     }
-    return normal_equations(sums).strewn_blocks(cells);
+    // Where faces end errs by itself: cells of their own.
+    const std::uint32_t first = cells.empty() ? 0 : cells.back().cell + 1;
+    for (CellGradient cell :
+         cell_gradients(rim_edges_, views_, poses_, scaling_, options_.symmetric, cell_mm, context_)) {
+      cell.cell += first;
+      LinkBlock part;
+      part.gradient = cell.gradient;
+      cell.gradient = part_not_held_by(both_ways(cell.link, sums), part, scaling_, kHeldByFaces).gradient;
+      cells.push_back(cell);
+    }
+    return normal_equations(sums, rim_blocks(sums, rim_sums)).strewn_blocks(cells);
   }
 
   void describe_uncertainty(const NormalEquations& equations, std::span<const EdgeSums> sums, double variance,
@@ -492,7 +565,8 @@ class JointRefinement {
   int fixed_;
   std::vector<SampledView> views_;
   std::vector<Pose> poses_;
-  std::vector<DirectedEdge> edges_;  // two per link
+  std::vector<DirectedEdge> edges_;      // two per link
+  std::vector<DirectedEdge> rim_edges_;  // the same two, of the ends of faces; or none
   Scaling scaling_;
   double diameter_ = 0.0;
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
@@ -522,7 +596,7 @@ Result<void> RefineOptions::validate() const {
 RefineOptions RefineOptions::as_published() const {
   RefineOptions published = *this;
   published.paper_mode = true;
-  published.face_normals = published.rim_weights = published.reach_weights = false;
+  published.face_normals = published.rim_weights = published.rim_matches = published.reach_weights = false;
   published.edge_weights = published.anneal = published.coarse_to_fine = published.keep_matches = false;
   published.drop_unheld = published.symmetric = false;
   return published;

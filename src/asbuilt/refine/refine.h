@@ -35,6 +35,7 @@ struct RefineOptions {
   // What goes beyond the paper; paper mode turns all of it off. What each is worth: bench/README.md, docs/refine.md.
   bool face_normals = true;    ///< normals fitted to the points of one face, not across edges
   bool rim_weights = true;     ///< points at a scan's rim hardly count: they may be mixed, and the surface ends
+  bool rim_matches = false;    ///< where a face of one scan ends is held against the face across that edge in another
   bool reach_weights = true;   ///< a match counts less the further it reaches beyond the plane that was fitted
   bool edge_weights = true;    ///< edges count by their variance
   bool anneal = true;          ///< reach and robust scale shrink from the misalignment to the noise
@@ -59,6 +60,7 @@ void for_each_field(RefineOptions& options, Visitor&& field) {
   field("converged_motion", options.converged_motion, "motion below which it stops, in units of the residual noise");
   field("face_normals", options.face_normals, "normals fitted to the points of one face, not across edges");
   field("rim_weights", options.rim_weights, "points at the rim of a scan hardly count");
+  field("rim_matches", options.rim_matches, "ends of faces are held against the faces across their edges");
   field("reach_weights", options.reach_weights, "a match counts less beyond the plane that was fitted");
   field("edge_weights", options.edge_weights, "links count by the variance of their residuals");
   field("anneal", options.anneal, "reach and robust scale shrink from the misalignment to the noise");

@@ -104,11 +104,11 @@ std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& clo
 
 // At a rim the sensor may have mixed the part with what stands behind it, and the surface ends there: such a point is
 // biased rather than noisy. It counts so little that it decides nothing where there are others, but not nothing: where
-// two scans share only their rims, these still hold them together. Of a part of small features nearly all is near a rim,
-// among it what holds the pose best: at most half of a view's weight is given up.
-std::vector<float> rim_weights(const SampledView& view, double scan_spacing_mm, const Context& context) {
+// two scans share only their rims, these still hold them together. Of a part of small features nearly all is near a
+// rim, among it what holds the pose best: at most half of a view's weight is given up.
+std::vector<float> rim_weights(const SampledView& view, const std::vector<Place>& places, double scan_spacing_mm,
+                               const Context& context) {
   constexpr double kNearRim = 0.03, kLeastLeft = 0.5;
-  const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
   std::vector<char> rim(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) rim[i] = places[i] == Place::rim ? 1 : 0;
   const std::vector<char> near_rim = dilated(rim, view.points, kRimInSpacings * scan_spacing_mm, context);
@@ -159,8 +159,16 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
     view.points.normals = scan::face_normals(view.points, *view.tree, noise_sigma_mm, view.spacing_mm, context);
   }
   view.weight.assign(view.points.size(), 1.0F);
-  if (rules.rim_weights && view.spacing_mm > 0.0) {
-    view.weight = rim_weights(view, median_spacing(segment.positions), context);
+  if ((rules.rim_weights || rules.rim_matches) && view.spacing_mm > 0.0) {
+    const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
+    if (rules.rim_weights) view.weight = rim_weights(view, places, median_spacing(segment.positions), context);
+    std::vector<std::uint32_t> rim;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i] == Place::rim) rim.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (rules.rim_matches) {
+      view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, noise_sigma_mm, context);
+    }
   }
   for (const Eigen::Vector3f& point : view.points.positions) view.centroid += point.cast<double>();
   const auto count = static_cast<double>(view.points.size());

@@ -8,6 +8,7 @@
 #include "asbuilt/core/context.h"
 #include "asbuilt/core/kd_tree.h"
 #include "asbuilt/core/point_cloud.h"
+#include "asbuilt/refine/rim_points.h"
 
 namespace asbuilt::refine {
 
@@ -26,6 +27,7 @@ struct SamplingRules {
   std::size_t points = 25000, coarse_points = 2500;
   bool face_normals = true;  ///< normals fitted anew, to the points of one face only
   bool rim_weights = true;   ///< what may be mixed with something behind it hardly counts
+  bool rim_matches = false;  ///< where faces end is measured
 };
 
 /// A view as the refinement works with it, in its own scan frame.
@@ -33,6 +35,7 @@ struct SampledView {
   PointCloud points;                  ///< 20-30 k evenly spread points
   std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
   std::vector<float> weight;          ///< of each point, in (0, 1]
+  RimPoints rims;                     ///< where its flat faces end
   double spacing_mm = 0.0;
   double fit_radius_mm = 0.0;  ///< how far the plane at a point has been fitted
   double noise_sigma_mm = 0.0;
