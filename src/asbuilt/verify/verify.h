@@ -31,7 +31,7 @@ struct VerifyOptions {
   double min_proof = 0.34;                ///< score * normal agreement * (1 - residual ratio / 0.58)
   double hidden_surcharge =
       0.15;  ///< added to min_proof per share of the part that other things hide: what hides can lie
-  double missing_surcharge = 1.0;         ///< likewise per share that should be visible and returned nothing
+  double missing_surcharge = 0.3;         ///< likewise per share that should be visible and returned nothing
   double edges_surcharge = 0.12;          ///< likewise where only edges hold the pose
   double no_rays_surcharge = 0.26;        ///< likewise where the viewpoint is unknown: no ray can refute a lie
   double min_weakest_direction = 0.0035;  ///< see PoseEvidence::weakest_direction; not needed where the edges hold it

@@ -266,7 +266,6 @@ TEST(Verdict, OnASecondInstanceIsAmbiguous) {
 }
 
 TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
-  constexpr double kLost = 0.15;  // so much that the face alone is acceptable, but not beyond doubt
   const auto status_beside = [](const Candidate& best, double missing_share, double support) {
     Candidate face = flawless({300, 0, 600});
     face.weakest_direction = 0.0, face.slip_lead = 60.0, face.loose_directions = 2;
@@ -274,14 +273,14 @@ TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
     return decide({best, face}, block(), {});
   };
   for (const double support : {0.3, 0.5}) {
-    const Detection detection = status_beside(flawless(), kLost, support);
+    const Detection detection = status_beside(flawless(), 0.3, support);
     EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
     EXPECT_GT(detection.best.weakest_direction, 0.0);
   }
   EXPECT_EQ(status_beside(flawless(), 0.0, 0.3).reason, Reason::second_instance) << "edges hold it beyond doubt";
   Candidate doubtful = flawless();
   doubtful.contradiction_share = 0.02;
-  EXPECT_EQ(status_beside(doubtful, kLost, 0.3).reason, Reason::second_instance);
+  EXPECT_EQ(status_beside(doubtful, 0.3, 0.3).reason, Reason::second_instance);
 }
 
 TEST(Verdict, KnowsASecondPlacementFromClutterAndFromAnotherPoseInThePlace) {
