@@ -14,7 +14,7 @@
 #include "../program.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/mesh_file.h"
-#include "asbuilt/io/ply_writer.h"
+#include "asbuilt/simulate/simulate.h"
 #include "cases.h"
 #include "curves.h"
 #include "parts.h"
@@ -73,18 +73,6 @@ std::string mode_name(const Arguments& arguments) {
   return name;
 }
 
-/// PART_SEED.ply as `asbuilt detect` reads it, to look at a scan or to judge it alone.
-Result<void> write_scan(const std::filesystem::path& folder, const CaseRecord& record, const CaseScan& scan) {
-  std::vector<float> x, y, z;
-  for (const Eigen::Vector3f& point : scan.points_in_scan.positions) {
-    x.push_back(point.x());
-    y.push_back(point.y());
-    z.push_back(point.z());
-  }
-  const std::vector<io::PlyColumn> columns{{"x", std::span(x)}, {"y", std::span(y)}, {"z", std::span(z)}};
-  return io::write_ply(folder / fmt::format("{}_{}.ply", record.part, record.seed), columns);
-}
-
 Result<void> judge_cases(const Arguments& arguments) {
   ASBUILT_TRY(options, options_of(arguments));
   const Context context(arguments.selection.threads);
@@ -94,10 +82,16 @@ Result<void> judge_cases(const Arguments& arguments) {
     }
     ASBUILT_TRY(made, prepared(part, options, context));
     const auto shared = std::make_shared<const PreparedPart>(std::move(made));
-    return [&, shared](CaseRecord& record, const CaseScan& simulated) -> Result<void> {
-      const CaseScan scan = arguments.mode == "moved" ? moved(simulated, record.seed) : simulated;
-      if (!arguments.write_scans.empty()) ASBUILT_CHECK(write_scan(arguments.write_scans, record, scan));
+    const auto judge_scan = [&, shared](CaseRecord& record, const CaseScan& scan) -> Result<void> {
+      if (!arguments.write_scans.empty()) {  // as `asbuilt detect` reads it, to look at it or to judge it alone
+        const std::string name = fmt::format("{}_{}.ply", record.part, record.seed);
+        ASBUILT_CHECK(simulate::write_points(arguments.write_scans / name, scan.points_in_scan.positions));
+      }
       return judge(record, scan, part, *shared, options, context);
+    };
+    return [&, judge_scan](CaseRecord& record, const CaseScan& scan) {
+      if (arguments.mode == "moved") return judge_scan(record, moved(scan, record.seed));
+      return judge_scan(record, scan);
     };
   };
   return run_cases(arguments.selection, mode_name(arguments), judge_for, context);
@@ -175,7 +169,9 @@ int run(int argc, char** argv) {
       ->check(CLI::IsMember({"default", "moved", "none", "paper"}))
       ->capture_default_str();
   cases->add_option("--set", arguments.settings, "NAME=VALUE for any option of the product, for ablations");
-  cases->add_option("--write", arguments.write_scans, "folder for the scans themselves, as PART_SEED.ply, and the part, PART.ply")
+  cases
+      ->add_option("--write", arguments.write_scans,
+                   "folder for the scans themselves, as PART_SEED.ply, and the part, PART.ply")
       ->check(CLI::ExistingDirectory);
   CLI::App* summary = app.add_subcommand("summary", "Figures of OUT/cases.jsonl: summary.json, summary.md, curves");
   summary->add_option("output", selection.output, "OUT")->required();

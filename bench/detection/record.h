@@ -56,7 +56,8 @@ struct CaseRecord {
   Judged unverified;  ///< the cluster with most votes, registered; score: its votes
   double votes = 0.0, support = 0.0, visible_share = 0.0, normal_agreement = 0.0, contradiction_share = 0.0,
          hidden_share = 0.0, missing_share = 0.0, facing_share = 0.0, residual_ratio = 0.0, weakest_direction = 0.0,
-         slip_lead = 0.0, size_hold = 0.0, size_lead = 0.0, lost_end_share = 0.0, pierced_share = 0.0, overrun_share = 0.0;
+         slip_lead = 0.0, size_hold = 0.0, size_lead = 0.0, lost_end_share = 0.0, pierced_share = 0.0,
+         overrun_share = 0.0;
   int explained_samples = 0;
   int loose_directions = 0;
   std::uint64_t votes_cast = 0;  ///< by all reference points

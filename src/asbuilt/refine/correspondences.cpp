@@ -99,6 +99,14 @@ struct Task {
   std::size_t edge, begin, end;
 };
 
+// What may_keep() asks the next time.
+void note_search(DirectedEdge& edge, const Pose& now, const MatchRules& rules) {
+  edge.target_from_source = now;
+  edge.searched_reach_mm = edge.reach_mm;
+  edge.searched_coarse = rules.coarse;
+  edge.searched = true;
+}
+
 }  // namespace
 
 std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const SampledView> views,
@@ -107,10 +115,7 @@ std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const Sampl
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const Pose now = target_from_source(edges[e], poses);
     if (may_keep(edges[e], now, views, rules)) continue;
-    edges[e].target_from_source = now;
-    edges[e].searched_reach_mm = edges[e].reach_mm;
-    edges[e].searched_coarse = rules.coarse;
-    edges[e].searched = true;
+    note_search(edges[e], now, rules);
     due.push_back(e);
   }
   std::vector<std::vector<Match>> found(edges.size());
@@ -159,10 +164,7 @@ void find_rim_matches(std::vector<DirectedEdge>& edges, std::span<const SampledV
     DirectedEdge& edge = edges[e];
     const Pose now = target_from_source(edge, poses);
     if (context.cancelled() || may_keep(edge, now, views, rules)) return;
-    edge.target_from_source = now;
-    edge.searched_reach_mm = edge.reach_mm;
-    edge.searched_coarse = rules.coarse;
-    edge.searched = true;
+    note_search(edge, now, rules);
     edge.matches.clear();
     const SampledView& from = view_at(views, edge.source);
     const SampledView& to = view_at(views, edge.target);

@@ -162,11 +162,11 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
   if ((rules.rim_weights || rules.rim_matches) && view.spacing_mm > 0.0) {
     const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
     if (rules.rim_weights) view.weight = rim_weights(view, places, median_spacing(segment.positions), context);
-    std::vector<std::uint32_t> rim;
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i] == Place::rim) rim.push_back(static_cast<std::uint32_t>(i));
-    }
     if (rules.rim_matches) {
+      std::vector<std::uint32_t> rim;
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        if (places[i] == Place::rim) rim.push_back(static_cast<std::uint32_t>(i));
+      }
       view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, noise_sigma_mm, context);
     }
   }

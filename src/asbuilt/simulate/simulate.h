@@ -65,4 +65,7 @@ struct Simulation {
 /// if need be; each file whole or not at all. Errors: unwritable_output.
 [[nodiscard]] Result<void> write_simulation(const std::filesystem::path& folder, const Simulation& simulation);
 
+/// A scan as write_simulation() writes it: a binary PLY of x, y and z, mm in the scan frame. Errors: unwritable_output.
+[[nodiscard]] Result<void> write_points(const std::filesystem::path& path, const std::vector<Eigen::Vector3f>& points);
+
 }  // namespace asbuilt::simulate

@@ -42,6 +42,8 @@ Json truth_of(const SimulatedScan& scan) {
   return truth;
 }
 
+}  // namespace
+
 Result<void> write_points(const std::filesystem::path& path, const std::vector<Eigen::Vector3f>& points) {
   std::array<std::vector<float>, 3> columns;
   for (const Eigen::Vector3f& point : points) {
@@ -52,8 +54,6 @@ Result<void> write_points(const std::filesystem::path& path, const std::vector<E
                                             {"z", std::span<const float>(columns[2])}}};
   return io::write_ply(path, table);
 }
-
-}  // namespace
 
 Result<void> write_simulation(const std::filesystem::path& folder, const Simulation& simulation) {
   std::error_code failure;

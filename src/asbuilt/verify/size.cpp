@@ -43,9 +43,10 @@ double size_hold(const PoseEvidence& evidence) {
 double size_lead(const Pose& model_from_scan, const PoseEvidence& evidence, const model::PreparedModel& model,
                  const ScanEvidence& scan, const EvidenceOptions& options) {
   const Eigen::Vector3d fixed = fixed_point(evidence, model);
+  ContrastOf contrast(model_from_scan, model, scan, options);
   double lead = std::numeric_limits<double>::infinity();
   for (const double size : kSizes) {
-    const PoseContrast seen = contrast(model_from_scan, SizedPose(model_from_scan, size, fixed), model, scan, options);
+    const PoseContrast seen = contrast.against(SizedPose(model_from_scan, size, fixed));
     lead = std::min(lead, seen.for_first - seen.for_second);
   }
   return lead;
