@@ -31,8 +31,9 @@ std::string joint_lines(const io::RunRecord& record) {
   }
   if (record.refinement && !record.refinement->empty()) {
     const io::RefinementRecord& refinement = record.refinement->front();
-    text += fmt::format("refinement: rms {:.4g} -> {:.4g} mm between scans, {} iterations{}\n", refinement.rms_before,
-                        refinement.rms_after, refinement.iterations, refinement.converged ? "" : ", not converged");
+    text += fmt::format("refinement: rms {:.4g} -> {:.4g} mm between scans, {} iterations{}{}\n", refinement.rms_before,
+                        refinement.rms_after, refinement.iterations, refinement.converged ? "" : ", not converged",
+                        refinement.on_model ? "; scans hold one another loosely, the CAD has helped" : "");
   }
   if (record.deviation) {
     const io::DeviationRecord& deviation = *record.deviation;

@@ -9,6 +9,7 @@
 #include "asbuilt/evaluate/truth.h"
 #include "asbuilt/graph/pose_graph.h"
 #include "asbuilt/io/mesh_file.h"
+#include "asbuilt/scan/occluders.h"
 #include "asbuilt/scan/scan.h"
 #include "asbuilt/simulate/simulate.h"
 
@@ -33,6 +34,7 @@ Result<refine::View> true_view(const std::vector<Eigen::Vector3f>& points, const
   view.model_from_scan = model_from_scan;
   view.noise_sigma_mm = scan.noise_sigma_mm;
   view.viewpoint = scan.viewpoint;
+  view.beside_occluder = scan::Occluders(scan).beside(view.segment_in_scan, context);
   return view;
 }
 

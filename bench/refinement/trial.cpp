@@ -14,6 +14,7 @@
 #include "asbuilt/graph/pose_graph.h"
 #include "asbuilt/refine/gauge.h"
 #include "asbuilt/refine/link_evidence.h"
+#include "asbuilt/refine/loose_views.h"
 #include "asbuilt/refine/suspicious_view.h"
 #include "asbuilt/simulate/parts.h"
 
@@ -111,7 +112,8 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     const std::vector<int>& members = graph.components.front();
     const std::vector<refine::View> together = chosen(remaining, members);
     const std::vector<refine::Link> links = links_among(graph, members);
-    ASBUILT_TRY(refinement, refine::refine(together, links, options, context));
+    ASBUILT_TRY(refinement, refine::refine_on_model(together, links, *scene.prepared.surface, scene.diameter_mm(),
+                                                    options, context));
     ASBUILT_TRY(suspect, contradicted(together, links, refinement, context));
     if (suspect >= 0 && round > 1) {
       const int at = members[static_cast<std::size_t>(suspect)];

@@ -172,6 +172,7 @@ Json json_of(const RefinementRecord& refinement) {
       {"rms_before", json_number(refinement.rms_before)},
       {"rms_after", json_number(refinement.rms_after)},
       {"converged", refinement.converged},
+      {"on_model", refinement.on_model},
       {"gauge", {{"method", refinement.gauge_method}, {"model_from_refined", json_of(refinement.model_from_refined)}}},
       {"edges", std::move(edges)},
       {"links", std::move(links)}};
@@ -347,6 +348,7 @@ RefinementRecord refinement_of(const Json& json) {
   refinement.rms_before = number_at(json, "rms_before");
   refinement.rms_after = number_at(json, "rms_after");
   refinement.converged = json.at("converged").get<bool>();
+  refinement.on_model = json.value("on_model", false);  // earlier versions did not ask the CAD
   refinement.gauge_method = json.at("gauge").at("method").get<std::string>();
   refinement.model_from_refined = pose_of(json.at("gauge").at("model_from_refined"));
   for (const Json& edge : json.at("edges")) {

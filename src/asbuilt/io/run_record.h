@@ -126,6 +126,7 @@ struct RefinementRecord {
   int component = 0, fixed_scan = 0, iterations = 0;
   double rms_before = 0.0, rms_after = 0.0;
   bool converged = false;
+  bool on_model = false;  ///< scans hold one another loosely: the CAD has helped to place them
   std::string gauge_method = "best_fit";  ///< "best_fit" or "fixed"
   Pose model_from_refined = Pose::Identity();
   std::vector<EdgeRecord> edges;

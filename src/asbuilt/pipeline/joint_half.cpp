@@ -157,6 +157,7 @@ io::RefinementRecord recorded_refinement(const RefinedComponent& component, int 
   record.rms_before = refinement.rms_before_mm;
   record.rms_after = refinement.rms_after_mm;
   record.converged = refinement.converged;
+  record.on_model = refinement.on_model;
   record.gauge_method = options.gauge == Gauge::best_fit ? "best_fit" : "fixed";
   record.model_from_refined = component.model_from_refined;
   for (const refine::EdgeResidual& edge : refinement.edges) {

@@ -225,9 +225,11 @@ Result<void> take_acceptances(std::vector<verify::Detection>& placements, const 
   return {};
 }
 
-/// One entry for each placement, with its points of the scan out of which it was cut.
+/// One entry for each placement, with its points of the scan out of which it was cut. `occluders` are those of all that
+/// the sensor saw.
 std::vector<JudgedScan> entries_of(const io::ScanRecord& of_scan, const std::vector<verify::Detection>& placements,
-                                   const scan::Scan& scan, const io::ScanFile& file, const ScanHalf& half) {
+                                   const scan::Scan& scan, const scan::Occluders& occluders, const io::ScanFile& file,
+                                   const ScanHalf& half, const Context& context) {
   std::vector<JudgedScan> entries;
   for (const verify::Detection& detection : placements) {
     JudgedScan entry{of_scan, {}};
@@ -235,7 +237,9 @@ std::vector<JudgedScan> entries_of(const io::ScanRecord& of_scan, const std::vec
     entry.record.instances_in_scan = static_cast<int>(placements.size());
     describe_detection(entry.record, detection);
     if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
-    if (!detection.segment.empty()) entry.segment = cut_out(scan, file, detection, half.model.prepared);
+    if (!detection.segment.empty()) {
+      entry.segment = cut_out(scan, file, detection, half.model.prepared, occluders, context);
+    }
     entries.push_back(std::move(entry));
   }
   return entries;
@@ -283,11 +287,13 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
       std::ranges::any_of(found.placements, [](const auto& placement) { return !placement.segment.empty(); });
   const bool is_thinned = thin || file.thinning;
   if (thin && !is_found) record.spacing = spacing_of_all(file.cloud, context);  // a closer look would have told
-  if (!is_thinned || !is_found) return entries_of(record, found.placements, *scan, thin ? *thin : file, half);
+  const scan::Occluders occluders(*scan);
+  const auto entries_as_found = [&] {
+    return entries_of(record, found.placements, *scan, occluders, thin ? *thin : file, half, context);
+  };
+  if (!is_thinned || !is_found) return entries_as_found();
 
-  if (half.early_verdict) {
-    half.early_verdict(file, entries_of(record, found.placements, *scan, thin ? *thin : file, half));
-  }
+  if (half.early_verdict) half.early_verdict(file, entries_as_found());
   const auto taken = folder.stage("look_closer", file.name);
   const double sought_spacing_mm =
       thin ? half.options.detect.search_spacing_ratio * half.model.prepared.sampling_distance
@@ -305,7 +311,7 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
   record.noise_sigma = closer.scan.noise_sigma_mm;
   record.spacing = closer.scan.spacing_mm;
   record.normals_oriented = closer.scan.normals_oriented;
-  return entries_of(record, closer.placements, closer.scan, closer.file, half);
+  return entries_of(record, closer.placements, closer.scan, occluders, closer.file, half, context);
 }
 
 }  // namespace asbuilt::pipeline

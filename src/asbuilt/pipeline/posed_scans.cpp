@@ -10,6 +10,7 @@
 #include "asbuilt/pipeline/segment_file.h"
 #include "asbuilt/refine/gauge.h"
 #include "asbuilt/refine/link_evidence.h"
+#include "asbuilt/refine/loose_views.h"
 #include "asbuilt/refine/suspicious_view.h"
 
 namespace asbuilt::pipeline {
@@ -41,8 +42,11 @@ Matrix6d adjoint(const Pose& b_from_a) {
 }
 
 Result<refine::Refinement> refined(const std::vector<refine::View>& views, const std::vector<refine::Link>& links,
-                                   const Options& options, const Context& context) {
-  if (views.size() > 1) return refine::refine(views, links, options.refine, context);
+                                   const LoadedModel& model, const Options& options, const Context& context) {
+  if (views.size() > 1) {
+    return refine::refine_on_model(views, links, *model.prepared.surface, model.prepared.diameter, options.refine,
+                                   context);
+  }
   refine::Refinement alone;
   alone.model_from_scan = {views.front().model_from_scan};
   alone.covariance = {Matrix6d::Zero()};
@@ -66,6 +70,7 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
   for (const int member : members) {
     const PosedScan& scan = scans[static_cast<std::size_t>(member)];
     views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
+    if (scan.taken_from.empty()) views.back().beside_occluder = scan.beside_occluder;
   }
   return views;
 }
@@ -79,7 +84,8 @@ Result<PosedScan> posed_scan(const io::ScanRecord& scan, int index, const std::f
   ASBUILT_TRY(part, read_part(segment, scan.offset));
   PosedScan posed;
   posed.index = index;
-  posed.part = std::move(part);
+  posed.part = std::move(part.cloud);
+  posed.beside_occluder = std::move(part.beside_occluder);
   posed.model_from_local_detected = *scan.model_from_scan * Eigen::Translation3d(scan.offset);
   posed.model_from_local_start = posed.model_from_local_detected;
   posed.noise_sigma_mm = scan.noise_sigma;
@@ -133,7 +139,7 @@ Result<RefinedComponent> refine_component(const std::vector<int>& members, const
                                           const Options& options, const Context& context) {
   const std::vector<refine::View> views = views_of(members, scans);
   RefinedComponent component{members, links_among(members, graph), {}, Pose::Identity()};
-  ASBUILT_TRY(refinement, refined(views, component.links, options, context));
+  ASBUILT_TRY(refinement, refined(views, component.links, model, options, context));
   component.refinement = std::move(refinement);
   if (options.gauge == Gauge::best_fit) {
     ASBUILT_TRY(gauge, refine::best_fit_gauge(views, component.refinement.model_from_scan, *model.prepared.surface,

@@ -25,6 +25,7 @@ namespace asbuilt::pipeline {
 struct PosedScan {
   int index = 0;                                      ///< in the record
   PointCloud part;                                    ///< in the scan frame minus the offset
+  std::vector<std::uint8_t> beside_occluder;          ///< of each point of `part` as read; empty: not known
   PointCloud taken_out;                               ///< by remove_seen_through
   std::vector<std::uint32_t> taken_from;              ///< where these stood in `part` as read, ascending
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates

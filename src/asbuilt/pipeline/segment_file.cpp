@@ -12,7 +12,7 @@
 namespace asbuilt::pipeline {
 namespace {
 
-constexpr const char* kDetected = "part_detected";
+constexpr const char *kDetected = "part_detected", *kBesideOccluder = "beside_occluder";
 
 /// One coordinate of all vectors, moved by `shift`.
 template <class Scalar>
@@ -35,7 +35,7 @@ Eigen::Vector3f turned_outwards(const Eigen::Vector3f& normal_in_scan, const Eig
 }  // namespace
 
 Segment cut_out(const scan::Scan& scan, const io::ScanFile& file, const verify::Detection& detection,
-                const model::PreparedModel& model) {
+                const model::PreparedModel& model, const scan::Occluders& occluders, const Context& context) {
   std::vector<std::uint32_t> indices;
   std::ranges::merge(detection.segment, detection.margin_points, std::back_inserter(indices));
   Segment segment;
@@ -49,6 +49,7 @@ Segment cut_out(const scan::Scan& scan, const io::ScanFile& file, const verify::
     if (!file.intensities.empty()) segment.intensities.push_back(file.intensities[scan.source_index[i]]);
     segment.is_part.push_back(std::ranges::binary_search(detection.segment, i) ? 1 : 0);
   }
+  segment.beside_occluder = occluders.beside(segment.cloud, context);
   return segment;
 }
 
@@ -77,6 +78,9 @@ Result<void> write_segment(const std::filesystem::path& path, const Segment& seg
   columns.push_back({"part", std::span<const std::uint8_t>(segment.is_part)});
   if (!segment.was_part_detected.empty()) {
     columns.push_back({kDetected, std::span<const std::uint8_t>(segment.was_part_detected)});
+  }
+  if (!segment.beside_occluder.empty()) {
+    columns.push_back({kBesideOccluder, std::span<const std::uint8_t>(segment.beside_occluder)});
   }
   std::array<std::vector<std::uint8_t>, 3> channels;
   constexpr std::array<const char*, 3> kChannelNames{"red", "green", "blue"};
@@ -111,9 +115,13 @@ Result<Segment> read_segment(const std::filesystem::path& path, const Eigen::Vec
     segment.cloud.normals.emplace_back(normal.cast<float>());
     segment.is_part.push_back((*columns[6])[i] != 0.0 ? 1 : 0);
   }
-  if (const auto* detected = vertices.find(kDetected)) {
-    for (const double value : *detected) segment.was_part_detected.push_back(value != 0.0 ? 1 : 0);
-  }
+  const auto read_flags = [&](const char* name, std::vector<std::uint8_t>& flags) {
+    const std::vector<double>* values = vertices.find(name);
+    if (values == nullptr) return;
+    for (const double value : *values) flags.push_back(value != 0.0 ? 1 : 0);
+  };
+  read_flags(kDetected, segment.was_part_detected);
+  read_flags(kBesideOccluder, segment.beside_occluder);
   const auto *red = vertices.find("red"), *green = vertices.find("green"), *blue = vertices.find("blue");
   if (red != nullptr && green != nullptr && blue != nullptr) {
     const auto channel = [](double value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0)); };
@@ -127,15 +135,16 @@ Result<Segment> read_segment(const std::filesystem::path& path, const Eigen::Vec
   return segment;
 }
 
-Result<PointCloud> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm) {
+Result<DetectedPart> read_part(const std::filesystem::path& path, const Eigen::Vector3d& offset_mm) {
   ASBUILT_TRY(segment, read_segment(path, offset_mm));
   const std::vector<std::uint8_t>& is_part =
       segment.was_part_detected.empty() ? segment.is_part : segment.was_part_detected;
-  PointCloud part;
+  DetectedPart part;
   for (std::size_t i = 0; i < is_part.size(); ++i) {
     if (is_part[i] == 0) continue;
-    part.positions.push_back(segment.cloud.positions[i]);
-    part.normals.push_back(segment.cloud.normals[i]);
+    part.cloud.positions.push_back(segment.cloud.positions[i]);
+    part.cloud.normals.push_back(segment.cloud.normals[i]);
+    if (!segment.beside_occluder.empty()) part.beside_occluder.push_back(segment.beside_occluder[i]);
   }
   return part;
 }

@@ -91,8 +91,33 @@ std::uint32_t across_edge(std::size_t rim, const SampledView& from, const Sample
   const KdTree::Neighbour other =
       to.tree->nearest_facing(end - kBehind * spacing * normal, aside, to.points.normals, outward, kFacesOutwards);
   if (!other.found() || std::abs(to.points.normals[other.index].dot(normal)) > kOtherFace) return KdTree::kNone;
+  if (to.on_flat_face[other.index] == 0) return KdTree::kNone;  // nobody's plane
   if (normal.dot(to.points.positions[other.index] - end) > -kLeastBehind * spacing) return KdTree::kNone;
   return other.index;
+}
+
+// A few ends by themselves are chance: each must have others that end before the same face.
+void keep_companions(std::vector<Match>& matches, const PointCloud& target) {
+  constexpr int kLeastTogether = 8;
+  constexpr float kSameFace = 0.95F;  // cosine
+  struct Face {
+    Eigen::Vector3f normal;  // of the first that ends before it
+    int count;
+  };
+  std::vector<Face> faces;  // a handful
+  const auto face_of = [&](const Match& match) {
+    const Eigen::Vector3f& normal = target.normals[match.target];
+    return std::ranges::find_if(faces, [&](const Face& face) { return face.normal.dot(normal) > kSameFace; });
+  };
+  for (const Match& match : matches) {
+    const auto face = face_of(match);
+    if (face == faces.end()) {
+      faces.push_back({target.normals[match.target], 1});
+    } else {
+      ++face->count;
+    }
+  }
+  std::erase_if(matches, [&](const Match& match) { return face_of(match)->count < kLeastTogether; });
 }
 
 struct Task {
@@ -168,6 +193,7 @@ void find_rim_matches(std::vector<DirectedEdge>& edges, std::span<const SampledV
     edge.matches.clear();
     const SampledView& from = view_at(views, edge.source);
     const SampledView& to = view_at(views, edge.target);
+    if (to.on_flat_face.empty()) return;
     const double noise = squared(from.noise_sigma_mm) + squared(to.noise_sigma_mm);
     const double floor = squared(0.01 * to.spacing_mm);
     const double gap = squared(from.spacing_mm) / 12.0;  // variance of where a face ends within a spacing
@@ -176,6 +202,7 @@ void find_rim_matches(std::vector<DirectedEdge>& edges, std::span<const SampledV
       const std::uint32_t target = across_edge(i, from, to, now, edge.reach_mm);
       if (target != KdTree::kNone) edge.matches.push_back({static_cast<std::uint32_t>(i), target, weight});
     }
+    keep_companions(edge.matches, to.points);
   });
 }
 

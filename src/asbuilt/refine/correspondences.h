@@ -22,7 +22,8 @@ struct Match {
 struct DirectedEdge {
   int source = 0, target = 0;
   double reach_mm = 0.0;       ///< longest match
-  double scale_mm = 0.0;       ///< robust scale of the residuals
+  double spread_mm = 0.0;      ///< robust scale of the residuals
+  double scale_mm = 0.0;       ///< beyond it the loss is flat
   double weight = 1.0;         ///< of every residual, from the variance of the edge
   double normal_spread = 0.0;  ///< median sine between the normals of a match
   std::vector<Match> matches;  ///< by increasing source

@@ -33,4 +33,10 @@ namespace asbuilt::refine {
 [[nodiscard]] Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,
                                             const Context& context);
 
+/// The view fitted to the CAD from its own pose, as the gauge is. Its information is that of a part whose
+/// deviations have the size of the residuals and are alike within patches, of which a view has but a few.
+/// Errors: invalid_argument (no normals, no diameter), not_possible (no point near the surface), cancelled.
+[[nodiscard]] Result<ModelFit> fit_to_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,
+                                            const Context& context);
+
 }  // namespace asbuilt::refine

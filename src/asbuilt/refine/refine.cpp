@@ -33,6 +33,8 @@ constexpr double kHeldInSpreads = 1.0;    // squared spreads of the normals that
 constexpr double kMinHeld = 1e-7, kMaxHeld = 5e-3;  // bounds of the rank threshold of an edge
 constexpr double kHeldByFaces = 0.01;               // where ends of faces have no say
 constexpr double kAlikeInRadii = 0.4;               // of a view: so far apart, errors of matches have little in common
+constexpr double kOverclaimed = 3.0;                // squared errors of links / their squared claims
+constexpr double kFirmInScales = 1.0;               // standard deviation of a view, in units of noise
 constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
 double squared(double x) { return x * x; }
@@ -110,11 +112,13 @@ class JointRefinement {
     for (const View& view : views) poses_.push_back(view.model_from_scan);
     measure();
     make_edges();
+    make_model_holds(views);
   }
 
   Result<Refinement> run() {
     Refinement result;
     result.fixed_view = fixed_;
+    result.on_model = !model_holds_.empty();
     if (!edges_.empty()) ASBUILT_CHECK(descend(result));
     if (!edges_.empty()) ASBUILT_CHECK(conclude(result));
     result.converged = edges_.empty() || result.converged;
@@ -126,12 +130,18 @@ class JointRefinement {
  private:
   enum class Outcome { improved, settled };
 
+  struct ModelHold {
+    Matrix6d information;  // of scaled twists
+    Pose model_from_scan;
+  };
+
   void sample(std::span<const View> views) {
     const SamplingRules rules{static_cast<std::size_t>(options_.points_per_scan), kCoarsePoints, options_.face_normals,
                               options_.rim_weights, options_.rim_matches};
     views_.resize(views.size());
     parallel_for(context_, views.size(), 1, [&](std::size_t v) {
-      views_[v] = sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, rules, context_);
+      views_[v] =
+          sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, rules, context_, views[v].beside_occluder);
     });
   }
 
@@ -165,6 +175,39 @@ class JointRefinement {
         if (options_.rim_matches) rim_edges_.push_back(edge);
       }
     }
+  }
+
+  // What the CAD says of each view.
+  void make_model_holds(std::span<const View> views) {
+    if (!std::ranges::all_of(views, [](const View& view) { return view.on_model.has_value(); })) return;
+    const Matrix6d twist_from_scaled = scaling_.twist_from_scaled();
+    for (const View& view : views) {
+      const Matrix6d information = twist_from_scaled.transpose() * view.on_model->information * twist_from_scaled;
+      model_holds_.push_back({0.5 * (information + information.transpose()), view.on_model->model_from_scan});
+    }
+    const auto fixed = static_cast<std::size_t>(fixed_);
+    model_motion_ = poses_[fixed] * model_holds_[fixed].model_from_scan.inverse(Eigen::Isometry);
+  }
+
+  // Like links to one more view, the CAD, which moves with the rest: it says where views are against one another.
+  // Errors of matches are not independent, so that a link claims to know some ten times more than it does (squared
+  // errors over squared claims, docs/refine.md); `emphasis` sets that right.
+  [[nodiscard]] std::vector<LinkBlock> model_blocks(double emphasis) const {
+    std::vector<LinkBlock> blocks;
+    for (std::size_t v = 0; v < model_holds_.size(); ++v) {
+      const ModelHold& hold = model_holds_[v];
+      const Pose off = poses_[v] * (model_motion_ * hold.model_from_scan).inverse(Eigen::Isometry);
+      const Eigen::AngleAxisd turn(off.linear());
+      Vector6d twist;
+      twist << scaling_.length_mm * turn.angle() * turn.axis(), off * scaling_.origin - scaling_.origin;
+      LinkBlock block;
+      block.first = static_cast<int>(v);
+      block.second = static_cast<int>(views_.size());
+      block.information = emphasis * squared(usual_scale_) * hold.information;
+      block.gradient = block.information * twist;
+      blocks.push_back(block);
+    }
+    return blocks;
   }
 
   [[nodiscard]] double start_reach() const { return options_.start_distance_ratio * diameter_; }
@@ -205,7 +248,10 @@ class JointRefinement {
     for (std::size_t e = 0; e < edges_.size(); ++e) {
       const double own = std::max(statistics[e].scale_mm, scale_floor(edges_[e]));
       const double scale = options_.anneal ? std::min(own, kMaxScaleRatio * usual_scale_) : usual_scale_;
+      edges_[e].spread_mm = scale;
       edges_[e].scale_mm = kTukeyTuning * scale;
+      // Fits to the CAD agree on most faces from the start; what the others say must not pass for outliers.
+      if (!model_holds_.empty()) edges_[e].scale_mm = std::max(edges_[e].scale_mm, to_go(edges_[e]));
       edges_[e].normal_spread = statistics[e].normal_spread;
       // Each edge counts by its own variance: precise scanners lead, and a view that stands wrong cannot bend the rest.
       const double ratio = squared(usual_scale_ / own);
@@ -214,14 +260,18 @@ class JointRefinement {
     return searched;
   }
 
+  // How far the reach has to shrink yet.
+  [[nodiscard]] double to_go(const DirectedEdge& edge) const {
+    return edge.reach_mm - kReachInSpacings * target(edge).spacing_mm;
+  }
+
   // Weight and scale are those of the edge's other matches. A scale of its own would be wider, as a face ends anywhere
   // within a spacing, and would believe rims that are no ends of faces.
   void match_rims(bool coarse, bool afresh) {
     for (std::size_t e = 0; e < rim_edges_.size(); ++e) {
       rim_edges_[e].reach_mm = edges_[e].reach_mm;
       // While the reach shrinks, nothing else may hold the views where these matches lead them.
-      const double to_go = edges_[e].reach_mm - kReachInSpacings * target(edges_[e]).spacing_mm;
-      rim_edges_[e].scale_mm = std::max(edges_[e].scale_mm, to_go);
+      rim_edges_[e].scale_mm = std::max(edges_[e].scale_mm, to_go(edges_[e]));
       rim_edges_[e].weight = edges_[e].weight;
     }
     MatchRules matching = rules(coarse);
@@ -237,21 +287,21 @@ class JointRefinement {
     return total_cost(edges_, views_, poses, options_.symmetric, context_);
   }
 
+  [[nodiscard]] double wanted_reach(const DirectedEdge& edge) const {
+    return std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.spread_mm);
+  }
+
   // From the misalignment to the noise: the reach follows the residuals down, edge by edge.
   void shrink_reach() {
     if (!options_.anneal) return;
     for (DirectedEdge& edge : edges_) {
-      const double wanted =
-          std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
-      edge.reach_mm = std::min(edge.reach_mm, std::max(wanted, kReachDecay * edge.reach_mm));
+      edge.reach_mm = std::min(edge.reach_mm, std::max(wanted_reach(edge), kReachDecay * edge.reach_mm));
     }
   }
 
   [[nodiscard]] bool reach_is_settled() const {
     return !options_.anneal || std::ranges::all_of(edges_, [&](const DirectedEdge& edge) {
-      const double wanted =
-          std::max(kReachInSpacings * target(edge).spacing_mm, kReachInScales * edge.scale_mm / kTukeyTuning);
-      return edge.reach_mm <= 1.2 * wanted;
+      return edge.reach_mm <= 1.2 * wanted_reach(edge);
     });
   }
 
@@ -281,8 +331,14 @@ class JointRefinement {
     return both;
   }
 
-  // Information of a link below this is what the noise of normals feigns.
+  // Information of a link below this is not believed. Where there is better, ends of faces and the CAD, not even what
+  // may be more than feigned.
   [[nodiscard]] double held_threshold(std::size_t link) const {
+    return model_holds_.empty() ? feigned_below(link) : std::max(kHeldByFaces, feigned_below(link));
+  }
+
+  // Information of a link below this is what the noise of normals feigns.
+  [[nodiscard]] double feigned_below(std::size_t link) const {
     const double spread = std::max(edges_[2 * link].normal_spread, edges_[2 * link + 1].normal_spread);
     return std::clamp(kHeldInSpreads * squared(spread), kMinHeld, kMaxHeld);
   }
@@ -301,8 +357,8 @@ class JointRefinement {
     return blocks;
   }
 
-  [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums,
-                                                 std::span<const LinkBlock> rim_blocks) const {
+  [[nodiscard]] NormalEquations normal_equations(std::span<const EdgeSums> sums, std::span<const LinkBlock> rim_blocks,
+                                                 std::span<const LinkBlock> model_blocks) const {
     std::vector<LinkBlock> blocks;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       const EdgeSums both = both_ways(l, sums);
@@ -313,20 +369,24 @@ class JointRefinement {
       blocks.back().information += rim_blocks[l].information;
       blocks.back().gradient += rim_blocks[l].gradient;
     }
-    return {static_cast<int>(views_.size()), fixed_, blocks};
+    blocks.insert(blocks.end(), model_blocks.begin(), model_blocks.end());
+    const std::size_t nodes = views_.size() + (model_blocks.empty() ? 0 : 1);
+    return {static_cast<int>(nodes), fixed_, blocks};
+  }
+
+  [[nodiscard]] Pose moved(const Pose& pose, const Vector6d& scaled_twist) const {
+    // Rotate about the origin of the scaling: with large coordinates, x -> R x + t about zero would lose digits.
+    const Eigen::Matrix3d rotation = rotation_from_axis_angle(scaled_twist.head<3>() / scaling_.length_mm);
+    Pose result = pose;
+    result.linear() = rotation * pose.linear();
+    result.translation() = rotation * (pose.translation() - scaling_.origin) + scaling_.origin + scaled_twist.tail<3>();
+    return orthonormalised(result);
   }
 
   [[nodiscard]] std::vector<Pose> moved(std::span<const Vector6d> scaled_step) const {
     std::vector<Pose> result = poses_;
     for (std::size_t v = 0; v < poses_.size(); ++v) {
-      if (static_cast<int>(v) == fixed_) continue;  // exactly where it was, not almost
-      // Rotate about the origin of the scaling: with large coordinates, x -> R x + t about zero would lose digits.
-      const Vector6d& s = scaled_step[v];
-      const Eigen::Matrix3d rotation = rotation_from_axis_angle(s.head<3>() / scaling_.length_mm);
-      Pose pose = poses_[v];
-      pose.linear() = rotation * pose.linear();
-      pose.translation() = rotation * (pose.translation() - scaling_.origin) + scaling_.origin + s.tail<3>();
-      result[v] = orthonormalised(pose);
+      if (static_cast<int>(v) != fixed_) result[v] = moved(poses_[v], scaled_step[v]);  // exactly where it was
     }
     return result;
   }
@@ -357,16 +417,18 @@ class JointRefinement {
   }
 
   // One Levenberg-Marquardt step for the current matches; `motion` is what it moved.
-  Outcome take_step(const NormalEquations& equations, std::span<const LinkBlock> rim_blocks, double cost,
-                    double& motion) {
+  Outcome take_step(const NormalEquations& equations, std::span<const LinkBlock> rim_blocks,
+                    std::span<const LinkBlock> model_blocks, double cost, double& motion) {
     motion = 0.0;
     for (int attempt = 0; attempt < 8; ++attempt) {
       const std::vector<Vector6d> step = equations.step(damping_, options_.paper_mode);
       if (!step.empty()) {
         const std::vector<Pose> candidate = moved(step);
-        if (cost_at(candidate) + modelled_change(rim_blocks, step) < cost) {
+        const double modelled = modelled_change(rim_blocks, step) + modelled_change(model_blocks, step);
+        if (cost_at(candidate) + modelled < cost) {
           motion = largest_motion(step);
           poses_ = candidate;
+          if (!model_blocks.empty()) model_motion_ = moved(model_motion_, step.back());
           damping_ = std::max(0.1 * damping_, 1e-9);
           return Outcome::improved;
         }
@@ -396,8 +458,8 @@ class JointRefinement {
       }
       if (iteration == 0) result.rms_before_mm = pooled_rms(sums);
       double motion = 0.0;
-      const std::vector<LinkBlock> rims = rim_blocks(sums, rim_sums);
-      const Outcome outcome = take_step(normal_equations(sums, rims), rims, total.cost, motion);
+      const std::vector<LinkBlock> rims = rim_blocks(sums, rim_sums), model = model_blocks(kOverclaimed);
+      const Outcome outcome = take_step(normal_equations(sums, rims, model), rims, model, total.cost, motion);
       result.iterations = iteration + 1;
       context_.report_progress(static_cast<double>(iteration + 1) / static_cast<double>(options_.max_iterations + 1));
 
@@ -431,10 +493,28 @@ class JointRefinement {
       for (Match& match : edge.matches) match.weight = 1.0F;
     }
     const std::vector<EdgeSums> plain = linearised(edges_);
-    describe_uncertainty(normal_equations(plain, rim_blocks(plain, rim_sums)), plain, unit_variance(plain), strewn,
-                         result);
+    const double variance = unit_variance(plain);
+    describe_uncertainty(normal_equations(plain, rim_blocks(plain, rim_sums), model_blocks(1.0)), plain, variance,
+                         strewn, result);
+    result.firmly_held = is_firmly_held(plain, variance);
     for (std::size_t l = 0; l < links_.size(); ++l) result.link_holds.push_back(hold_of_link(l, both_ways(l, plain)));
     return {};
+  }
+
+  [[nodiscard]] bool is_firmly_held(std::span<const EdgeSums> sums, double variance) const {
+    std::vector<LinkBlock> blocks;
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const EdgeSums both = both_ways(l, sums);
+      const LinkBlock block{links_[l].first, links_[l].second, both.information, Vector6d::Zero(), both.weight};
+      blocks.push_back(held_part(block, both, scaling_, std::max(kHeldByFaces, feigned_below(l))));
+    }
+    const NormalEquations equations(static_cast<int>(views_.size()), fixed_, blocks);
+    const std::vector<Matrix6d> inverse = equations.inverse_blocks();
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      if (static_cast<int>(v) == fixed_) continue;
+      if (hold_of_view(v, variance * inverse[v], {}).sigma_mm[0] > kFirmInScales * usual_scale_) return false;
+    }
+    return true;
   }
 
   [[nodiscard]] LinkHold hold_of_link(std::size_t link, const EdgeSums& both) const {
@@ -489,7 +569,22 @@ class JointRefinement {
       cell.gradient = part_not_held_by(both_ways(cell.link, sums), part, scaling_, kHeldByFaces).gradient;
       cells.push_back(cell);
     }
-    return normal_equations(sums, rim_blocks(sums, rim_sums)).strewn_blocks(cells);
+    const std::vector<LinkBlock> model = model_blocks(kOverclaimed);
+    add_model_cells(model, cells);
+    return normal_equations(sums, rim_blocks(sums, rim_sums), model).strewn_blocks(cells);
+  }
+
+  // Gradients whose spread is that of a pose that the CAD holds as well as model_holds_ says.
+  void add_model_cells(std::span<const LinkBlock> model, std::vector<CellGradient>& cells) const {
+    for (std::size_t h = 0; h < model.size(); ++h) {
+      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(model_holds_[h].information);
+      for (Eigen::Index i = 0; i < 6; ++i) {
+        const double root = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]));
+        const std::uint32_t cell = cells.empty() ? 0 : cells.back().cell + 1;
+        cells.push_back({cell, static_cast<std::uint32_t>(links_.size() + h),
+                         kOverclaimed * squared(usual_scale_) * root * eigen.eigenvectors().col(i)});
+      }
+    }
   }
 
   void describe_uncertainty(const NormalEquations& equations, std::span<const EdgeSums> sums, double variance,
@@ -567,6 +662,8 @@ class JointRefinement {
   std::vector<Pose> poses_;
   std::vector<DirectedEdge> edges_;      // two per link
   std::vector<DirectedEdge> rim_edges_;  // the same two, of the ends of faces; or none
+  std::vector<ModelHold> model_holds_;   // one a view, or none
+  Pose model_motion_ = Pose::Identity();
   Scaling scaling_;
   double diameter_ = 0.0;
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
@@ -598,7 +695,7 @@ RefineOptions RefineOptions::as_published() const {
   published.paper_mode = true;
   published.face_normals = published.rim_weights = published.rim_matches = published.reach_weights = false;
   published.edge_weights = published.anneal = published.coarse_to_fine = published.keep_matches = false;
-  published.drop_unheld = published.symmetric = false;
+  published.drop_unheld = published.loose_on_model = published.symmetric = false;
   return published;
 }
 

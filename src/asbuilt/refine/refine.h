@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,12 +15,22 @@
 
 namespace asbuilt::refine {
 
+/// Where one scan's own points fit the CAD best, and how well they hold it there.
+struct ModelFit {
+  Pose model_from_scan = Pose::Identity();
+  /// Inverse covariance of the twist (rotation rad, translation mm) applied on the left, for a part that deviates from
+  /// its CAD as the scan shows; zero along what the surface in sight does not hold.
+  Matrix6d information = Matrix6d::Zero();
+};
+
 /// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
 struct View {
   PointCloud segment_in_scan;
   Pose model_from_scan = Pose::Identity();
   double noise_sigma_mm = 0.0;  ///< 0: unknown
   scan::Viewpoint viewpoint{};  ///< in the scan frame, if known
+  std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
+  std::optional<ModelFit> on_model{};  ///< what holds it where the other scans do not; all views have it, or none
 };
 
 /// Undirected link; both directions enter Eq. 5.
@@ -35,13 +47,14 @@ struct RefineOptions {
   // What goes beyond the paper; paper mode turns all of it off. What each is worth: bench/README.md, docs/refine.md.
   bool face_normals = true;    ///< normals fitted to the points of one face, not across edges
   bool rim_weights = true;     ///< points at a scan's rim hardly count: they may be mixed, and the surface ends
-  bool rim_matches = false;    ///< where a face of one scan ends is held against the face across that edge in another
+  bool rim_matches = true;     ///< where a face of one scan ends is held against the face across that edge in another
   bool reach_weights = true;   ///< a match counts less the further it reaches beyond the plane that was fitted
   bool edge_weights = true;    ///< edges count by their variance
   bool anneal = true;          ///< reach and robust scale shrink from the misalignment to the noise
   bool coarse_to_fine = true;  ///< a thinned sample until no view moves by more than half the noise
   bool keep_matches = true;    ///< correspondences are searched again only where views have moved
   bool drop_unheld = true;     ///< a link says nothing about directions that it does not hold
+  bool loose_on_model = true;  ///< scans that hold one another only loosely are held against the CAD as well
   bool symmetric = false;      ///< symmetric point-to-plane residual (Rusinkiewicz 2019) in place of Eq. 4
   bool paper_mode = false;     ///< Eq. 5 as published: fixed robust scale, no annealing, all closest points
 
@@ -67,6 +80,8 @@ void for_each_field(RefineOptions& options, Visitor&& field) {
   field("coarse_to_fine", options.coarse_to_fine, "the first steps take a thinned sample");
   field("keep_matches", options.keep_matches, "correspondences are searched again only where scans have moved");
   field("drop_unheld", options.drop_unheld, "a link says nothing about directions that it does not hold");
+  field("loose_on_model", options.loose_on_model,
+        "scans that hold one another only loosely are held against the CAD as well");
   field("symmetric", options.symmetric, "symmetric point-to-plane residuals");
 }
 
@@ -100,6 +115,10 @@ struct Refinement {
   double rms_before_mm = 0.0, rms_after_mm = 0.0;  ///< weighted point-to-plane residual over all edges
   std::vector<EdgeResidual> edges;                 ///< two per link, in the order of the links
   std::vector<UnheldDirection> unheld;             ///< reported and not moved
+  /// Faces that links hold well are enough to know every view to within the noise. If not, what noise and curvature feign
+  /// has a share in the poses.
+  bool firmly_held = true;
+  bool on_model = false;  ///< the CAD had a say (View::on_model)
   std::vector<LinkHold> link_holds;                ///< one a link, in the order of the links
   std::vector<ViewHold> view_holds;                ///< one a view; empty without links
 };

@@ -121,6 +121,43 @@ std::vector<float> rim_weights(const SampledView& view, const std::vector<Place>
   return weights;
 }
 
+// Beside an edge, on a boss and in a dent a normal leans, and the plane through the point is nobody's.
+std::vector<char> on_flat_faces(const SampledView& view, const Context& context) {
+  constexpr float kAlike = 0.97F;  // cosine
+  constexpr float kLeastAlike = 0.85F;
+  const auto radius = static_cast<float>(kNeighbourhood * view.spacing_mm);
+  std::vector<char> flat(view.points.size(), 0);
+  parallel_for_blocks(context, flat.size(), 512, [&](std::size_t begin, std::size_t end) {
+    std::vector<KdTree::Neighbour> neighbours;
+    for (std::size_t i = begin; i < end; ++i) {
+      view.tree->within(view.points.positions[i], radius, neighbours);
+      const auto alike = std::ranges::count_if(neighbours, [&](const KdTree::Neighbour& neighbour) {
+        return view.points.normals[neighbour.index].dot(view.points.normals[i]) > kAlike;
+      });
+      flat[i] = static_cast<float>(alike) >= kLeastAlike * static_cast<float>(neighbours.size()) ? 1 : 0;
+    }
+  });
+  return flat;
+}
+
+// The points at a rim at which the surface does not go on behind something nearer.
+std::vector<std::uint32_t> open_rim(const SampledView& view, const std::vector<Place>& places,
+                                    const PointCloud& segment, std::span<const std::uint8_t> beside_occluder) {
+  constexpr float kBesideInSpacings = 1.5F;
+  std::vector<Eigen::Vector3f> covered;
+  for (std::size_t i = 0; i < segment.size(); ++i) {
+    if (beside_occluder[i] != 0) covered.push_back(segment.positions[i]);
+  }
+  const KdTree covered_tree(covered);
+  const float beside = kBesideInSpacings * static_cast<float>(view.spacing_mm);
+  std::vector<std::uint32_t> rim;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (places[i] != Place::rim || covered_tree.nearest(view.points.positions[i], beside).found()) continue;
+    rim.push_back(static_cast<std::uint32_t>(i));
+  }
+  return rim;
+}
+
 }  // namespace
 
 PointCloud evenly_sampled(const PointCloud& cloud, std::size_t count, const Context& context) {
@@ -146,7 +183,7 @@ std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double
 }
 
 SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const SamplingRules& rules,
-                         const Context& context) {
+                         const Context& context, std::span<const std::uint8_t> beside_occluder) {
   SampledView view;
   view.points = evenly_sampled(segment, rules.points, context);
   view.coarse = even_indices(view.points.positions, rules.coarse_points, context);
@@ -162,11 +199,9 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
   if ((rules.rim_weights || rules.rim_matches) && view.spacing_mm > 0.0) {
     const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
     if (rules.rim_weights) view.weight = rim_weights(view, places, median_spacing(segment.positions), context);
-    if (rules.rim_matches) {
-      std::vector<std::uint32_t> rim;
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        if (places[i] == Place::rim) rim.push_back(static_cast<std::uint32_t>(i));
-      }
+    if (rules.rim_matches && beside_occluder.size() == segment.size()) {
+      const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder);
+      view.on_flat_face = on_flat_faces(view, context);
       view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, noise_sigma_mm, context);
     }
   }

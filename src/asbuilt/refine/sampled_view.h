@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "asbuilt/core/context.h"
@@ -36,6 +37,7 @@ struct SampledView {
   std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
   std::vector<float> weight;          ///< of each point, in (0, 1]
   RimPoints rims;                     ///< where its flat faces end
+  std::vector<char> on_flat_face;     ///< of each point, where rims are matched: its neighbours have its normal
   double spacing_mm = 0.0;
   double fit_radius_mm = 0.0;  ///< how far the plane at a point has been fitted
   double noise_sigma_mm = 0.0;
@@ -44,7 +46,8 @@ struct SampledView {
   std::unique_ptr<const KdTree> tree;
 };
 
+/// `beside_occluder`: of each point of the segment (scan::Occluders); without it no rim is taken for an end.
 [[nodiscard]] SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const SamplingRules& rules,
-                                       const Context& context);
+                                       const Context& context, std::span<const std::uint8_t> beside_occluder = {});
 
 }  // namespace asbuilt::refine

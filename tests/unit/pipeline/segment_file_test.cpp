@@ -26,14 +26,16 @@ TEST(Segment, GivesBackThePartWithoutTheMargin) {
   const auto part = read_part(path, Eigen::Vector3d::Zero());
   ASSERT_TRUE(part.has_value()) << part.error().message;
   const Segment written = three_points();
-  EXPECT_EQ(part->positions, (std::vector{written.cloud.positions[0], written.cloud.positions[2]}));
-  EXPECT_EQ(part->normals, (std::vector{written.cloud.normals[0], written.cloud.normals[2]}));
+  EXPECT_EQ(part->cloud.positions, (std::vector{written.cloud.positions[0], written.cloud.positions[2]}));
+  EXPECT_EQ(part->cloud.normals, (std::vector{written.cloud.normals[0], written.cloud.normals[2]}));
+  EXPECT_TRUE(part->beside_occluder.empty()) << "nothing was known";
 }
 
 TEST(Segment, CutAnewKeepsTheFlagsOfTheScanHalfAndWhatTheSensorSaw) {
   const auto path = temporary("recut_segment.ply");
   Segment written = three_points();
   written.was_part_detected = {1, 1, 0};
+  written.beside_occluder = {0, 1, 1};
   written.colours = {{1, 2, 3}, {4, 5, 6}, {255, 0, 128}};
   written.intensities = {0.5F, 0.25F, 7.0F};
   ASSERT_TRUE(write_segment(path, written, Eigen::Vector3d::Zero()).has_value());
@@ -42,11 +44,13 @@ TEST(Segment, CutAnewKeepsTheFlagsOfTheScanHalfAndWhatTheSensorSaw) {
   EXPECT_EQ(read->cloud.positions, written.cloud.positions);
   EXPECT_EQ(read->is_part, written.is_part);
   EXPECT_EQ(read->was_part_detected, written.was_part_detected);
+  EXPECT_EQ(read->beside_occluder, written.beside_occluder);
   EXPECT_EQ(read->colours, written.colours);
   EXPECT_EQ(read->intensities, written.intensities);
   // The joint half begins with what the scan half had cut out.
-  EXPECT_EQ(read_part(path, Eigen::Vector3d::Zero())->positions,
-            (std::vector{written.cloud.positions[0], written.cloud.positions[1]}));
+  const auto part = read_part(path, Eigen::Vector3d::Zero());
+  EXPECT_EQ(part->cloud.positions, (std::vector{written.cloud.positions[0], written.cloud.positions[1]}));
+  EXPECT_EQ(part->beside_occluder, (std::vector<std::uint8_t>{0, 1}));
 }
 
 TEST(Segment, FarFromTheOriginIsWrittenInTheFilesCoordinatesWithoutLoss) {
@@ -58,7 +62,7 @@ TEST(Segment, FarFromTheOriginIsWrittenInTheFilesCoordinatesWithoutLoss) {
   EXPECT_NEAR((*vertices->find("x"))[0], 4.5e9 + 0.1, 1e-5);
   const auto part = read_part(path, offset);
   ASSERT_TRUE(part.has_value());
-  EXPECT_NEAR((part->positions[0] - three_points().cloud.positions[0]).norm(), 0.0F, 1e-5F);
+  EXPECT_NEAR((part->cloud.positions[0] - three_points().cloud.positions[0]).norm(), 0.0F, 1e-5F);
 }
 
 TEST(Segment, WithoutOurColumnsIsNotASegment) {

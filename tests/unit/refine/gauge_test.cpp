@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -286,6 +287,65 @@ TEST(StartNearModel, KeepsAPoseThatTheCadDoesNotExplain) {
   for (Eigen::Vector3f& point : view.segment_in_scan.positions) point *= 1.6F;  // another thing
   const Pose start = start_near_model(view, surface, diameter(mesh), Context(2)).value();
   EXPECT_EQ(start.matrix(), view.model_from_scan.matrix());
+}
+
+// Points of a face of the block that looks along `axis`, upwards.
+PointCloud faces_looking_along(const TriangleMesh& mesh, std::initializer_list<int> axes, double sigma) {
+  PointCloud chosen;
+  const PointCloud all = points_of(mesh, 60, sigma, 2);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const bool looks = std::ranges::any_of(axes, [&](int axis) { return all.normals[i][axis] > 0.9F; });
+    if (!looks) continue;
+    chosen.positions.push_back(all.positions[i]);
+    chosen.normals.push_back(all.normals[i]);
+  }
+  return chosen;
+}
+
+TEST(FitToModel, SaysWhatASingleFaceHolds) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  View view;
+  view.segment_in_scan = faces_looking_along(mesh, {1}, 0.05);  // y = 60: free in x, in z and about y
+  const ModelFit fit = fit_to_model(view, surface, diameter(mesh), Context(2)).value();
+  EXPECT_LT(worst_displacement(mesh, fit.model_from_scan), 0.05);
+  const double held = fit.information(4, 4);
+  EXPECT_GT(held, 0.0);
+  EXPECT_NEAR(fit.information(3, 3) / held, 0.0, 1e-6);
+  EXPECT_NEAR(fit.information(5, 5) / held, 0.0, 1e-6);
+  Vector6d turn = Vector6d::Zero();
+  turn[1] = 1.0;
+  EXPECT_NEAR(turn.dot(fit.information * turn) / (held * 2500.0), 0.0, 1e-6);
+}
+
+// A block that is 0.4 mm off its CAD here and there: fits of its views are as far off as they say.
+TEST(FitToModel, KnowsHowFarDeviationsLeadIt) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  double squares = 0.0;
+  int count = 0;
+  for (std::uint64_t draw = 0; draw < 20; ++draw) {
+    Random random(draw, "deviations", 0);
+    View view;
+    view.segment_in_scan = faces_looking_along(mesh, {0, 1, 2}, 0.05);
+    const Eigen::Vector3d waves(0.1 * random.uniform(0.5, 1.0), 0.1 * random.uniform(0.5, 1.0), 0.1);
+    const double phase = random.uniform(0.0, 6.0);
+    for (std::size_t i = 0; i < view.segment_in_scan.size(); ++i) {
+      Eigen::Vector3f& point = view.segment_in_scan.positions[i];
+      const double off = 0.4 * std::sin(waves.dot(point.cast<double>()) + phase);
+      point += static_cast<float>(off) * view.segment_in_scan.normals[i];
+    }
+    view.model_from_scan = small_motion(0.5);
+    const ModelFit fit = fit_to_model(view, surface, diameter(mesh), Context(2)).value();
+    const Eigen::AngleAxisd turn(fit.model_from_scan.linear());
+    Vector6d error;
+    error << turn.angle() * turn.axis(), fit.model_from_scan.translation();
+    squares += error.dot(fit.information * error) / 6.0;
+    ++count;
+  }
+  const double ratio = squares / count;  // 1 if claims are right
+  EXPECT_LT(ratio, 3.0);
+  EXPECT_GT(ratio, 0.03);
 }
 
 }  // namespace

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asbuilt/refine/loose_views.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "asbuilt/core/random.h"
+
+namespace asbuilt::refine {
+namespace {
+
+// A block, 120 x 80 x 60 mm about the origin.
+TriangleMesh block() {
+  TriangleMesh mesh;
+  for (const double z : {-30.0, 30.0}) {
+    for (const double y : {-40.0, 40.0}) {
+      for (const double x : {-60.0, 60.0}) mesh.vertices.emplace_back(x, y, z);
+    }
+  }
+  constexpr int kSides[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  for (const auto& side : kSides) {
+    mesh.triangles.emplace_back(side[0], side[1], side[2]);
+    mesh.triangles.emplace_back(side[0], side[2], side[3]);
+  }
+  return mesh;
+}
+
+constexpr double kNoise = 0.05;
+
+// Samples 1.5 mm apart of the sides that look along `sides`: 1, 2, 3 for x, y, z, negative for the opposite.
+View view_of(std::initializer_list<int> sides, std::uint64_t seed) {
+  View view;
+  Random random(seed, "block view", 0);
+  const Eigen::Vector3d half(60, 40, 30);
+  for (const int side : sides) {
+    const int axis = std::abs(side) - 1, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    const double sign = side > 0 ? 1.0 : -1.0;
+    const double from_u = random.uniform(0.0, 1.5), from_v = random.uniform(0.0, 1.5);
+    for (double a = from_u - half[u]; a < half[u]; a += 1.5) {
+      for (double b = from_v - half[v]; b < half[v]; b += 1.5) {
+        Eigen::Vector3d point;
+        point[axis] = sign * half[axis] + kNoise * random.normal();
+        point[u] = a;
+        point[v] = b;
+        view.segment_in_scan.positions.push_back(point.cast<float>());
+        view.segment_in_scan.normals.push_back((sign * Eigen::Vector3d::Unit(axis)).cast<float>());
+      }
+    }
+  }
+  view.noise_sigma_mm = kNoise;
+  return view;
+}
+
+double apart(const Refinement& refinement) {
+  const Pose motion = refinement.model_from_scan[0].inverse() * refinement.model_from_scan[1];
+  double worst = 0.0;
+  for (const Eigen::Vector3d& corner : block().vertices) worst = std::max(worst, (motion * corner - corner).norm());
+  return worst;
+}
+
+Refinement refined(std::vector<View> views, bool loose_on_model, const Eigen::Vector3d& start) {
+  views[1].model_from_scan.translation() = start;
+  const TriangleMesh mesh = block();
+  const model::SurfaceDistance surface(mesh);
+  RefineOptions options;
+  options.loose_on_model = loose_on_model;
+  const std::vector<Link> links{{0, 1}};
+  return refine_on_model(views, links, surface, diameter(mesh), options, Context(2)).value();
+}
+
+// Both see the top only, and each two sides that the other does not see: what they share leaves two slides and a turn,
+// which each view's own sides say against the CAD.
+TEST(LooseViews, AreHeldAgainstTheModelWhereTheyDoNotHoldOneAnother) {
+  const std::vector<View> views{view_of({3, 1, 2}, 1), view_of({3, -1, -2}, 2)};
+  const Eigen::Vector3d start(1.5, -1.0, 0.3);
+  const Refinement alone = refined(views, false, start), with = refined(views, true, start);
+  EXPECT_FALSE(alone.firmly_held);
+  EXPECT_GT(apart(alone), 1.0) << "nothing moved it";
+  EXPECT_LT(apart(with), kNoise);
+  EXPECT_EQ(with.covariance.size(), 2U);
+  EXPECT_LT(std::sqrt(with.covariance[1 - with.fixed_view](3, 3)), 0.2) << "and it is known to be there";
+}
+
+TEST(LooseViews, AreNotAskedOfTheModelWhereTheyHoldOneAnother) {
+  std::vector<View> views{view_of({3, 1, 2}, 1), view_of({3, 1, 2}, 2)};
+  const Eigen::Vector3d start(0.6, -0.4, 0.3);
+  const Refinement alone = refined(views, false, start), with = refined(views, true, start);
+  EXPECT_TRUE(alone.firmly_held);
+  for (std::size_t v = 0; v < 2; ++v) {
+    EXPECT_EQ(alone.model_from_scan[v].matrix(), with.model_from_scan[v].matrix()) << "to the bit";
+  }
+  EXPECT_LT(apart(with), kNoise);
+}
+
+// The CAD is shorter than the part by 2 mm along x. Two views that hold one another do not care.
+TEST(LooseViews, OfAPartThatDiffersFromItsModelAreHeldByOneAnotherFirst) {
+  const std::vector<View> views{view_of({3, 1, 2, -1}, 1), view_of({3, 1, -2}, 2)};  // share the top and one end
+  TriangleMesh shorter = block();
+  for (Eigen::Vector3d& vertex : shorter.vertices) vertex.x() *= 59.0 / 60.0;
+  const model::SurfaceDistance surface(shorter);
+  const std::vector<Link> links{{0, 1}};
+  const Refinement result = refine_on_model(views, links, surface, diameter(shorter), {}, Context(2)).value();
+  const Pose motion = result.model_from_scan[0].inverse() * result.model_from_scan[1];
+  EXPECT_NEAR(motion.translation().x(), 0.0, 2.0 * kNoise) << "held by what both see";
+  EXPECT_NEAR(motion.translation().z(), 0.0, 2.0 * kNoise);
+}
+
+TEST(LooseViews, AreLeftAloneInPaperMode) { EXPECT_FALSE(RefineOptions{}.as_published().loose_on_model); }
+
+}  // namespace
+}  // namespace asbuilt::refine
