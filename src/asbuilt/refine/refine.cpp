@@ -35,6 +35,7 @@ constexpr double kHeldByFaces = 0.01;               // where ends of faces have 
 constexpr double kAlikeInRadii = 0.4;               // of a view: so far apart, errors of matches have little in common
 constexpr double kOverclaimed = 3.0;                // squared errors of links / their squared claims
 constexpr double kFirmInScales = 1.0;               // standard deviation of a view, in units of noise
+constexpr int kStepsAtFullReach = 2;                // with the CAD
 constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
 double squared(double x) { return x * x; }
@@ -106,13 +107,14 @@ Matrix6d widened(const Matrix6d& motions, const Vector6d& variances, Eigen::Inde
 class JointRefinement {
  public:
   JointRefinement(std::span<const View> views, std::vector<Link> links, const RefineOptions& options,
-                  const Context& context)
+                  std::span<const ModelFit> on_model, const Context& context)
       : options_(options), context_(context), links_(std::move(links)), fixed_(view_with_most_points(views)) {
     sample(views);
     for (const View& view : views) poses_.push_back(view.model_from_scan);
+    if (!on_model.empty()) start_on_model(on_model);
     measure();
     make_edges();
-    make_model_holds(views);
+    make_model_holds(on_model);
   }
 
   Result<Refinement> run() {
@@ -177,16 +179,22 @@ class JointRefinement {
     }
   }
 
-  // What the CAD says of each view.
-  void make_model_holds(std::span<const View> views) {
-    if (!std::ranges::all_of(views, [](const View& view) { return view.on_model.has_value(); })) return;
-    const Matrix6d twist_from_scaled = scaling_.twist_from_scaled();
-    for (const View& view : views) {
-      const Matrix6d information = twist_from_scaled.transpose() * view.on_model->information * twist_from_scaled;
-      model_holds_.push_back({0.5 * (information + information.transpose()), view.on_model->model_from_scan});
-    }
+  // As the fits lie to one another; the fixed view stays where it was.
+  void start_on_model(std::span<const ModelFit> on_model) {
     const auto fixed = static_cast<std::size_t>(fixed_);
-    model_motion_ = poses_[fixed] * model_holds_[fixed].model_from_scan.inverse(Eigen::Isometry);
+    model_motion_ = poses_[fixed] * on_model[fixed].model_from_scan.inverse(Eigen::Isometry);
+    for (std::size_t v = 0; v < poses_.size(); ++v) {
+      if (v != fixed) poses_[v] = orthonormalised(model_motion_ * on_model[v].model_from_scan);
+    }
+  }
+
+  // What the CAD says of each view.
+  void make_model_holds(std::span<const ModelFit> on_model) {
+    const Matrix6d twist_from_scaled = scaling_.twist_from_scaled();
+    for (const ModelFit& fit : on_model) {
+      const Matrix6d information = twist_from_scaled.transpose() * fit.information * twist_from_scaled;
+      model_holds_.push_back({0.5 * (information + information.transpose()), fit.model_from_scan});
+    }
   }
 
   // Like links to one more view, the CAD, which moves with the rest: it says where views are against one another.
@@ -464,7 +472,8 @@ class JointRefinement {
       context_.report_progress(static_cast<double>(iteration + 1) / static_cast<double>(options_.max_iterations + 1));
 
       const bool settled = reach_is_settled();
-      shrink_reach();
+      // Along what the CAD does not hold, a view comes home by rims alone, which takes more than one step.
+      if (model_holds_.empty() || iteration >= kStepsAtFullReach) shrink_reach();
       if (outcome == Outcome::settled) damping_ = 1e-6;
       const bool quiet =
           outcome == Outcome::settled || motion < (coarse ? kCoarseMotion : options_.converged_motion) * usual_scale_;
@@ -700,13 +709,17 @@ RefineOptions RefineOptions::as_published() const {
 }
 
 Result<Refinement> refine(std::span<const View> views, std::span<const Link> links, const RefineOptions& chosen,
-                          const Context& context) {
+                          const Context& context, std::span<const ModelFit> on_model) {
   const RefineOptions options = chosen.paper_mode ? chosen.as_published() : chosen;
   ASBUILT_CHECK(options.validate());
   if (views.empty()) return fail(ErrorCode::invalid_argument, "there are no views to refine");
+  if (!on_model.empty() && on_model.size() != views.size()) {
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("{} fits to the CAD are given for {} views", on_model.size(), views.size()));
+  }
   for (std::size_t i = 0; i < views.size(); ++i) ASBUILT_CHECK(check_view(views[i], i));
   ASBUILT_TRY(unique_links, check_links(links, static_cast<int>(views.size())));
-  return JointRefinement(views, std::move(unique_links), options, context).run();
+  return JointRefinement(views, std::move(unique_links), options, on_model, context).run();
 }
 
 }  // namespace asbuilt::refine

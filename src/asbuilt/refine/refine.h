@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,14 +14,6 @@
 
 namespace asbuilt::refine {
 
-/// Where one scan's own points fit the CAD best, and how well they hold it there.
-struct ModelFit {
-  Pose model_from_scan = Pose::Identity();
-  /// Inverse covariance of the twist (rotation rad, translation mm) applied on the left, for a part that deviates from
-  /// its CAD as the scan shows; zero along what the surface in sight does not hold.
-  Matrix6d information = Matrix6d::Zero();
-};
-
 /// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
 struct View {
   PointCloud segment_in_scan;
@@ -30,7 +21,14 @@ struct View {
   double noise_sigma_mm = 0.0;  ///< 0: unknown
   scan::Viewpoint viewpoint{};  ///< in the scan frame, if known
   std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
-  std::optional<ModelFit> on_model{};  ///< what holds it where the other scans do not; all views have it, or none
+};
+
+/// Where one scan's own points fit the CAD best, and how well they hold it there.
+struct ModelFit {
+  Pose model_from_scan = Pose::Identity();
+  /// Inverse covariance of the twist (rotation rad, translation mm) applied on the left, for a part that deviates from
+  /// its CAD as the scan shows; zero along what the surface in sight does not hold.
+  Matrix6d information = Matrix6d::Zero();
 };
 
 /// Undirected link; both directions enter Eq. 5.
@@ -115,12 +113,12 @@ struct Refinement {
   double rms_before_mm = 0.0, rms_after_mm = 0.0;  ///< weighted point-to-plane residual over all edges
   std::vector<EdgeResidual> edges;                 ///< two per link, in the order of the links
   std::vector<UnheldDirection> unheld;             ///< reported and not moved
-  /// Faces that links hold well are enough to know every view to within the noise. If not, what noise and curvature feign
-  /// has a share in the poses.
+  /// Faces that links hold well are enough to know every view to within the noise. If not, what noise and curvature
+  /// feign has a share in the poses.
   bool firmly_held = true;
-  bool on_model = false;  ///< the CAD had a say (View::on_model)
-  std::vector<LinkHold> link_holds;                ///< one a link, in the order of the links
-  std::vector<ViewHold> view_holds;                ///< one a view; empty without links
+  bool on_model = false;              ///< the CAD had a say
+  std::vector<LinkHold> link_holds;   ///< one a link, in the order of the links
+  std::vector<ViewHold> view_holds;   ///< one a view; empty without links
 };
 
 /// Minimises Eq. 5 over all poses of one component at once; the CAD does not enter.
@@ -129,10 +127,14 @@ struct Refinement {
 /// one kd-tree a view. Beyond the paper (docs/refine.md): reach and robust scale shrink edge by edge from the
 /// misalignment to the noise, border points attract nothing, directions that an edge does not hold are taken out of it.
 ///
+/// With `on_model`, one fit a view, the views start as their fits lie to one another and are held there as firmly as
+/// these know; of links only what they hold well is believed then. The fixed view stays where it is.
+///
 /// Cost: about 1 us a point, link, direction and full iteration on a core; most iterations run on a thinned sample.
-/// Errors: invalid_argument (options, an empty segment, no normals, non-finite values, a bad link), not_possible (the
-/// links do not connect the views, or no correspondences are found), cancelled.
+/// Errors: invalid_argument (options, as many fits as views, an empty segment, no normals, non-finite values, a bad
+/// link), not_possible (the links do not connect the views, or no correspondences are found), cancelled.
 [[nodiscard]] Result<Refinement> refine(std::span<const View> views, std::span<const Link> links,
-                                        const RefineOptions& options, const Context& context);
+                                        const RefineOptions& options, const Context& context,
+                                        std::span<const ModelFit> on_model = {});
 
 }  // namespace asbuilt::refine

@@ -106,6 +106,15 @@ TEST(LooseViews, OfAPartThatDiffersFromItsModelAreHeldByOneAnotherFirst) {
   EXPECT_NEAR(motion.translation().z(), 0.0, 2.0 * kNoise);
 }
 
+TEST(LooseViews, NeedOneFitEach) {
+  const std::vector<View> views{view_of({3, 1, 2}, 1), view_of({3, -1, -2}, 2)};
+  const std::vector<Link> links{{0, 1}};
+  const std::vector<ModelFit> one_fit(1);
+  const auto result = refine(views, links, {}, Context(1), one_fit);
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+}
+
 TEST(LooseViews, AreLeftAloneInPaperMode) { EXPECT_FALSE(RefineOptions{}.as_published().loose_on_model); }
 
 }  // namespace
