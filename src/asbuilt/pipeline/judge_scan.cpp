@@ -226,10 +226,10 @@ Result<void> take_acceptances(std::vector<verify::Detection>& placements, const 
 }
 
 /// One entry for each placement, with its points of the scan out of which it was cut. `occluders` are those of all that
-/// the sensor saw.
+/// the sensor saw; they are there where a placement has a segment.
 std::vector<JudgedScan> entries_of(const io::ScanRecord& of_scan, const std::vector<verify::Detection>& placements,
-                                   const scan::Scan& scan, const scan::Occluders& occluders, const io::ScanFile& file,
-                                   const ScanHalf& half, const Context& context) {
+                                   const scan::Scan& scan, const std::optional<scan::Occluders>& occluders,
+                                   const io::ScanFile& file, const ScanHalf& half, const Context& context) {
   std::vector<JudgedScan> entries;
   for (const verify::Detection& detection : placements) {
     JudgedScan entry{of_scan, {}};
@@ -238,7 +238,7 @@ std::vector<JudgedScan> entries_of(const io::ScanRecord& of_scan, const std::vec
     describe_detection(entry.record, detection);
     if (accepted_candidate(file, entries.size() + 1, half.options)) entry.record.reason_code = "accepted_by_user";
     if (!detection.segment.empty()) {
-      entry.segment = cut_out(scan, file, detection, half.model.prepared, occluders, context);
+      entry.segment = cut_out(scan, file, detection, half.model.prepared, *occluders, context);
     }
     entries.push_back(std::move(entry));
   }
@@ -287,7 +287,8 @@ Result<std::vector<JudgedScan>> judge_scan(const io::ScanFile& file, const ScanH
       std::ranges::any_of(found.placements, [](const auto& placement) { return !placement.segment.empty(); });
   const bool is_thinned = thin || file.thinning;
   if (thin && !is_found) record.spacing = spacing_of_all(file.cloud, context);  // a closer look would have told
-  const scan::Occluders occluders(*scan);
+  std::optional<scan::Occluders> occluders;
+  if (is_found) occluders.emplace(*scan);
   const auto entries_as_found = [&] {
     return entries_of(record, found.placements, *scan, occluders, thin ? *thin : file, half, context);
   };
