@@ -106,6 +106,24 @@ TEST(LooseViews, OfAPartThatDiffersFromItsModelAreHeldByOneAnotherFirst) {
   EXPECT_NEAR(motion.translation().z(), 0.0, 2.0 * kNoise);
 }
 
+// Four views that agree leave slides open between them; a fifth, which is corrugated, is none of this part.
+TEST(LooseViews, AreNotAskedOfTheModelWhileOneOfThemIsContradicted) {
+  const TriangleMesh mesh = block();
+  const model::SurfaceDistance surface(mesh);
+  std::vector<View> views{view_of({3, 1, 2}, 1), view_of({3}, 2), view_of({3, -1, -2}, 3), view_of({3}, 5)};
+  std::vector<Link> links{{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}, {2, 3}};
+  EXPECT_TRUE(refine_on_model(views, links, surface, diameter(mesh), {}, Context(2))->on_model);
+  views.push_back(view_of({3, 1, 2}, 4));
+  PointCloud& corrugated = views.back().segment_in_scan;
+  for (std::size_t i = 0; i < corrugated.size(); ++i) {
+    corrugated.positions[i] += 2.0F * std::sin(0.7F * corrugated.positions[i].sum()) * corrugated.normals[i];
+  }
+  for (int other = 0; other < 3; ++other) links.push_back({other, 4});
+  const Refinement result = refine_on_model(views, links, surface, diameter(mesh), {}, Context(2)).value();
+  EXPECT_FALSE(result.firmly_held);
+  EXPECT_FALSE(result.on_model);
+}
+
 TEST(LooseViews, NeedOneFitEach) {
   const std::vector<View> views{view_of({3, 1, 2}, 1), view_of({3, -1, -2}, 2)};
   const std::vector<Link> links{{0, 1}};
