@@ -13,7 +13,6 @@
 #include "asbuilt/core/random.h"
 #include "asbuilt/graph/pose_graph.h"
 #include "asbuilt/refine/gauge.h"
-#include "asbuilt/refine/link_evidence.h"
 #include "asbuilt/refine/loose_views.h"
 #include "asbuilt/refine/suspicious_view.h"
 #include "asbuilt/simulate/parts.h"
@@ -45,17 +44,6 @@ std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::
     if (at(edge.first) >= 0 && at(edge.second) >= 0) links.push_back({at(edge.first), at(edge.second)});
   }
   return links;
-}
-
-Result<int> contradicted(const std::vector<refine::View>& views, const std::vector<refine::Link>& links,
-                         const refine::Refinement& refinement, const Context& context) {
-  const auto count = static_cast<int>(views.size());
-  ASBUILT_TRY(evidence, refine::link_evidence(views, refinement.model_from_scan, links, context));
-  if (const auto found = refine::contradicted_view(count, evidence)) return found->view;
-  double floor_mm = 0.0;
-  for (const refine::View& view : views) floor_mm = std::max(floor_mm, view.noise_sigma_mm);
-  const auto suspicious = refine::suspicious_view(count, refinement.edges, floor_mm);
-  return suspicious ? suspicious->view : -1;
 }
 
 Trial trial_of(const char* kind, const RefinementScene& scene, std::string variant, std::uint64_t seed,
@@ -114,9 +102,9 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     const std::vector<refine::Link> links = links_among(graph, members);
     ASBUILT_TRY(refinement, refine::refine_on_model(together, links, *scene.prepared.surface, scene.diameter_mm(),
                                                     options, context));
-    ASBUILT_TRY(suspect, contradicted(together, links, refinement, context));
-    if (suspect >= 0 && round > 1) {
-      const int at = members[static_cast<std::size_t>(suspect)];
+    ASBUILT_TRY(suspect, refine::view_against_others(together, links, refinement, context));
+    if (suspect && round > 1) {
+      const int at = members[static_cast<std::size_t>(*suspect)];
       run.dropped.push_back(left[static_cast<std::size_t>(at)]);
       left.erase(left.begin() + at);
       views = start;

@@ -265,8 +265,9 @@ Result<Pose> best_fit_gauge(std::span<const View> views, std::span<const Pose> r
 Result<ModelFit> fit_to_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,
                               const Context& context) {
   ASBUILT_CHECK(check_fitted(view, diameter_mm));
-  if (view.segment_in_scan.empty())
+  if (view.segment_in_scan.empty()) {
     return fail(ErrorCode::not_possible, "there are no scanned points to fit to the CAD");
+  }
   const PointCloud points = sampled_at(view, view.model_from_scan, kRoughPoints, context);
   GaugeFit fit(points, surface, diameter_mm, kReachRatio, context);
   ASBUILT_TRY(motion, fit.run());

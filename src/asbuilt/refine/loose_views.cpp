@@ -1,28 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/refine/loose_views.h"
 
-#include <algorithm>
 #include <vector>
 
 #include "asbuilt/refine/gauge.h"
-#include "asbuilt/refine/link_evidence.h"
 #include "asbuilt/refine/suspicious_view.h"
 
 namespace asbuilt::refine {
-namespace {
-
-// Whether the scans speak against one of them. On the CAD a wrong pose would stand as firmly as a right one.
-Result<bool> has_contradiction(std::span<const View> views, std::span<const Link> links, const Refinement& refinement,
-                               const Context& context) {
-  const auto count = static_cast<int>(views.size());
-  ASBUILT_TRY(evidence, link_evidence(views, refinement.model_from_scan, links, context));
-  if (contradicted_view(count, evidence)) return true;
-  double noise_mm = 0.0;
-  for (const View& view : views) noise_mm = std::max(noise_mm, view.noise_sigma_mm);
-  return suspicious_view(count, refinement.edges, noise_mm).has_value();
-}
-
-}  // namespace
 
 Result<Refinement> refine_on_model(std::span<const View> views, std::span<const Link> links,
                                    const model::SurfaceDistance& surface, double diameter_mm,
@@ -31,7 +15,8 @@ Result<Refinement> refine_on_model(std::span<const View> views, std::span<const 
   by_faces.rim_matches = options.rim_matches && !options.loose_on_model;
   auto by_scans = refine(views, links, by_faces, context);
   if (!by_scans || by_scans->firmly_held || options.paper_mode || !options.loose_on_model) return by_scans;
-  ASBUILT_TRY(contradicted, has_contradiction(views, links, *by_scans, context));
+  // On the CAD a wrong pose would stand as firmly as a right one.
+  ASBUILT_TRY(contradicted, view_against_others(views, links, *by_scans, context));
   if (contradicted) return by_scans;
   std::vector<ModelFit> on_model;
   for (const View& view : views) {

@@ -198,8 +198,8 @@ class JointRefinement {
   }
 
   // Like links to one more view, the CAD, which moves with the rest: it says where views are against one another.
-  // Errors of matches are not independent, so that a link claims to know some ten times more than it does (squared
-  // errors over squared claims, docs/refine.md); `emphasis` sets that right.
+  // Errors of matches are not independent, so that a link claims to know more than it does (kOverclaimed);
+  // `emphasis` sets that right.
   [[nodiscard]] std::vector<LinkBlock> model_blocks(double emphasis) const {
     std::vector<LinkBlock> blocks;
     for (std::size_t v = 0; v < model_holds_.size(); ++v) {

@@ -121,7 +121,7 @@ struct Refinement {
   std::vector<ViewHold> view_holds;   ///< one a view; empty without links
 };
 
-/// Minimises Eq. 5 over all poses of one component at once; the CAD does not enter.
+/// Minimises Eq. 5 over all poses of one component at once; without `on_model` the CAD does not enter.
 ///
 /// Levenberg-Marquardt on point-to-plane residuals of closest points, both ways over every link, analytic Jacobians,
 /// one kd-tree a view. Beyond the paper (docs/refine.md): reach and robust scale shrink edge by edge from the

@@ -86,14 +86,14 @@ Surroundings surroundings_of(const Eigen::Vector3f& centre, const Eigen::Vector3
   return result;
 }
 
-// Every point within `reach_mm` of a marked one.
-std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& cloud, double reach_mm,
-                          const Context& context) {
+// Every point within `reach_mm` of a marked one of `others`.
+std::vector<char> near_marked(std::span<const std::uint8_t> marked, const PointCloud& others, const PointCloud& cloud,
+                              double reach_mm, const Context& context) {
   std::vector<Eigen::Vector3f> seeds;
   for (std::size_t i = 0; i < marked.size(); ++i) {
-    if (marked[i] != 0) seeds.push_back(cloud.positions[i]);
+    if (marked[i] != 0) seeds.push_back(others.positions[i]);
   }
-  std::vector<char> result(marked.size(), 0);
+  std::vector<char> result(cloud.size(), 0);
   if (seeds.empty()) return result;
   const KdTree seed_tree(seeds);
   parallel_for(context, cloud.size(), 512, [&](std::size_t i) {
@@ -109,9 +109,10 @@ std::vector<char> dilated(const std::vector<char>& marked, const PointCloud& clo
 std::vector<float> rim_weights(const SampledView& view, const std::vector<Place>& places, double scan_spacing_mm,
                                const Context& context) {
   constexpr double kNearRim = 0.03, kLeastLeft = 0.5;
-  std::vector<char> rim(places.size());
+  std::vector<std::uint8_t> rim(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) rim[i] = places[i] == Place::rim ? 1 : 0;
-  const std::vector<char> near_rim = dilated(rim, view.points, kRimInSpacings * scan_spacing_mm, context);
+  const std::vector<char> near_rim =
+      near_marked(rim, view.points, view.points, kRimInSpacings * scan_spacing_mm, context);
   const auto all = static_cast<double>(near_rim.size());
   const auto near = static_cast<double>(std::ranges::count(near_rim, 1));
   const double wanted = near > 0.0 ? (kLeastLeft * all - (all - near)) / near : 1.0;
@@ -142,18 +143,14 @@ std::vector<char> on_flat_faces(const SampledView& view, const Context& context)
 
 // The points at a rim at which the surface does not go on behind something nearer.
 std::vector<std::uint32_t> open_rim(const SampledView& view, const std::vector<Place>& places,
-                                    const PointCloud& segment, std::span<const std::uint8_t> beside_occluder) {
-  constexpr float kBesideInSpacings = 1.5F;
-  std::vector<Eigen::Vector3f> covered;
-  for (std::size_t i = 0; i < segment.size(); ++i) {
-    if (beside_occluder[i] != 0) covered.push_back(segment.positions[i]);
-  }
-  const KdTree covered_tree(covered);
-  const float beside = kBesideInSpacings * static_cast<float>(view.spacing_mm);
+                                    const PointCloud& segment, std::span<const std::uint8_t> beside_occluder,
+                                    const Context& context) {
+  constexpr double kBesideInSpacings = 1.5;
+  const std::vector<char> covered =
+      near_marked(beside_occluder, segment, view.points, kBesideInSpacings * view.spacing_mm, context);
   std::vector<std::uint32_t> rim;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    if (places[i] != Place::rim || covered_tree.nearest(view.points.positions[i], beside).found()) continue;
-    rim.push_back(static_cast<std::uint32_t>(i));
+    if (places[i] == Place::rim && covered[i] == 0) rim.push_back(static_cast<std::uint32_t>(i));
   }
   return rim;
 }
@@ -200,7 +197,7 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
     const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
     if (rules.rim_weights) view.weight = rim_weights(view, places, median_spacing(segment.positions), context);
     if (rules.rim_matches && beside_occluder.size() == segment.size()) {
-      const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder);
+      const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder, context);
       view.on_flat_face = on_flat_faces(view, context);
       view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, noise_sigma_mm, context);
     }

@@ -8,6 +8,7 @@
 
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/median.h"
+#include "asbuilt/refine/link_evidence.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -53,6 +54,17 @@ std::optional<SuspiciousView> suspicious_view(int view_count, std::span<const Ed
     if (judged && (!worst || judged->spread_mm > worst->spread_mm)) worst = judged;
   }
   return worst;
+}
+
+Result<std::optional<int>> view_against_others(std::span<const View> views, std::span<const Link> links,
+                                               const Refinement& refinement, const Context& context) {
+  const auto count = static_cast<int>(views.size());
+  ASBUILT_TRY(evidence, link_evidence(views, refinement.model_from_scan, links, context));
+  if (const auto contradicted = contradicted_view(count, evidence)) return contradicted->view;
+  double noise_mm = 0.0;
+  for (const View& view : views) noise_mm = std::max(noise_mm, view.noise_sigma_mm);
+  const auto suspicious = suspicious_view(count, refinement.edges, noise_mm);
+  return suspicious ? std::optional<int>(suspicious->view) : std::nullopt;
 }
 
 }  // namespace asbuilt::refine

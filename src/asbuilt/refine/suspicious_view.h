@@ -26,4 +26,9 @@ struct SuspiciousView {
 [[nodiscard]] std::optional<SuspiciousView> suspicious_view(int view_count, std::span<const EdgeResidual> edges,
                                                             double floor_mm = 0.0);
 
+/// The view that the others contradict after `refinement`, by what they saw (contradicted_view) or else by its
+/// residuals (suspicious_view, with the noise as floor). Errors: as link_evidence().
+[[nodiscard]] Result<std::optional<int>> view_against_others(std::span<const View> views, std::span<const Link> links,
+                                                             const Refinement& refinement, const Context& context);
+
 }  // namespace asbuilt::refine

@@ -289,7 +289,7 @@ TEST(StartNearModel, KeepsAPoseThatTheCadDoesNotExplain) {
   EXPECT_EQ(start.matrix(), view.model_from_scan.matrix());
 }
 
-// Points of a face of the block that looks along `axis`, upwards.
+// Points of the faces of the block that look along these axes, upwards.
 PointCloud faces_looking_along(const TriangleMesh& mesh, std::initializer_list<int> axes, double sigma) {
   PointCloud chosen;
   const PointCloud all = points_of(mesh, 60, sigma, 2);
