@@ -63,6 +63,17 @@ double AccuracyJudge::relative_pose_error(std::span<const Pose> ours, std::span<
   return difference(ours, scene_.truth, members);
 }
 
+double AccuracyJudge::error_of_fits_to_truth(const Context& context) const {
+  std::vector<Pose> fitted;
+  for (std::size_t v = 0; v < scene_.views.size(); ++v) {
+    const auto points = placed(scene_, scene_.truth, {static_cast<int>(v)});
+    const Pose motion =
+        evaluate::best_motion_onto(points, scene_.as_built, surface_, scene_.noise_sigma_mm, Pose::Identity(), context);
+    fitted.push_back(motion * scene_.truth[v]);
+  }
+  return relative_pose_error(fitted);
+}
+
 Accuracy AccuracyJudge::judge(std::span<const Pose> ours, const Context& context, std::span<const int> members) const {
   const std::vector<int> chosen = all_or(members, scene_.views.size());
   const auto mine = placed(scene_, ours, chosen), truth = placed(scene_, scene_.truth, chosen);

@@ -26,6 +26,10 @@ class AccuracyJudge {
   [[nodiscard]] Accuracy judge(std::span<const Pose> ours, const Context& context,
                                std::span<const int> members = {}) const;
 
+  /// The same of views fitted one by one to the true as-built surface, which nobody has, from their true poses on: what
+  /// the points that each scan gives can tell of its pose at best.
+  [[nodiscard]] double error_of_fits_to_truth(const Context& context) const;
+
   /// The same between two sets of poses: how far one run ends from another, in sigma.
   [[nodiscard]] double difference(std::span<const Pose> a, std::span<const Pose> b,
                                   std::span<const int> members = {}) const;

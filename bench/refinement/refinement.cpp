@@ -122,6 +122,7 @@ Result<void> run_one(const Arguments& args) {
                scene.name, run.links, run.dropped.size(), run.members.size(), scene.views.size(),
                accuracy.relative_pose_error_sigma, accuracy.ratio_to_oracle(), run.refinement.iterations,
                run.refinement.converged ? "" : " (not converged)", run.seconds);
+    fmt::print("  views fitted to the true surface: {:.3f} sigma\n", judge.error_of_fits_to_truth(context));
     for (std::size_t i = 0; i < run.members.size(); ++i) {
       const std::vector<int> pair{run.members[static_cast<std::size_t>(run.refinement.fixed_view)], run.members[i]};
       if (run.refinement.view_holds.empty() || pair[0] == pair[1]) continue;

@@ -139,6 +139,7 @@ Result<std::vector<Trial>> start_trials(const RefinementScene& scene, int seeds,
     trials.push_back(std::move(trial));
   };
   add("0 deg 0 %", 0, reference, true);
+  trials.back().figures["fits_to_truth_sigma"] = judge.error_of_fits_to_truth(context);
   for (const auto& [name, angle, shift] : {std::tuple("3 deg 3 %", 3.0, 0.03), std::tuple("6 deg 5 %", 6.0, 0.05)}) {
     for (int seed = 0; seed < seeds; ++seed) {
       ASBUILT_TRY(run, joint_run(scene, perturbed(scene, angle, shift, static_cast<std::uint64_t>(seed)), {}, context));

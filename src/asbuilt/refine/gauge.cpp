@@ -271,7 +271,7 @@ Result<ModelFit> fit_to_model(const View& view, const model::SurfaceDistance& su
   const PointCloud points = sampled_at(view, view.model_from_scan, kRoughPoints, context);
   GaugeFit fit(points, surface, diameter_mm, kReachRatio, context);
   ASBUILT_TRY(motion, fit.run());
-  return ModelFit{orthonormalised(motion * view.model_from_scan), fit.information()};
+  return ModelFit{orthonormalised(motion * view.model_from_scan), fit.information(), fit.share_off(motion)};
 }
 
 Result<Pose> start_near_model(const View& view, const model::SurfaceDistance& surface, double diameter_mm,

@@ -29,6 +29,7 @@ struct ModelFit {
   /// Inverse covariance of the twist (rotation rad, translation mm) applied on the left, for a part that deviates from
   /// its CAD as the scan shows; zero along what the surface in sight does not hold.
   Matrix6d information = Matrix6d::Zero();
+  double share_off = 0.0;  ///< of its points: further off the CAD than parts deviate from theirs, or facing away from it
 };
 
 /// Undirected link; both directions enter Eq. 5.

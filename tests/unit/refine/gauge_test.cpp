@@ -318,6 +318,25 @@ TEST(FitToModel, SaysWhatASingleFaceHolds) {
   EXPECT_NEAR(turn.dot(fit.information * turn) / (held * 2500.0), 0.0, 1e-6);
 }
 
+TEST(FitToModel, TellsTheShareThatLiesOff) {
+  const TriangleMesh mesh = stepped_block();
+  const model::SurfaceDistance surface(mesh);
+  View view;
+  view.segment_in_scan = faces_looking_along(mesh, {0, 1, 2}, 0.05);
+  EXPECT_LT(fit_to_model(view, surface, diameter(mesh), Context(2))->share_off, 0.01);  // a few beside edges
+  PointCloud& cloud = view.segment_in_scan;
+  std::size_t lifted = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {  // a swelling over an end of the part, 4 % of the diameter high
+    if (cloud.positions[i].x() < 70.0F || cloud.normals[i].x() > 0.5F) continue;
+    cloud.positions[i] += static_cast<float>(0.04 * diameter(mesh)) * cloud.normals[i];
+    ++lifted;
+  }
+  const double share = static_cast<double>(lifted) / static_cast<double>(cloud.size());
+  ASSERT_GT(share, 0.1);
+  ASSERT_LT(share, 0.4);
+  EXPECT_NEAR(fit_to_model(view, surface, diameter(mesh), Context(2))->share_off, share, 0.05);
+}
+
 // A block that is 0.4 mm off its CAD here and there: fits of its views are as far off as they say.
 TEST(FitToModel, KnowsHowFarDeviationsLeadIt) {
   const TriangleMesh mesh = stepped_block();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "asbuilt/core/random.h"
+#include "asbuilt/refine/suspicious_view.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -122,6 +123,64 @@ TEST(LooseViews, AreNotAskedOfTheModelWhileOneOfThemIsContradicted) {
   const Refinement result = refine_on_model(views, links, surface, diameter(mesh), {}, Context(2)).value();
   EXPECT_FALSE(result.firmly_held);
   EXPECT_FALSE(result.on_model);
+}
+
+// A block with a step, 120 x 80 mm: 60 mm high where x < 0, 30 mm where x > 0.
+TriangleMesh step() {
+  TriangleMesh mesh;
+  const double profile[6][2] = {{-60, -30}, {60, -30}, {60, 0}, {0, 0}, {0, 30}, {-60, 30}};
+  for (const double y : {-40.0, 40.0}) {
+    for (const auto& corner : profile) mesh.vertices.emplace_back(corner[0], y, corner[1]);
+  }
+  for (int i = 0; i < 6; ++i) {
+    const int next = (i + 1) % 6;
+    mesh.triangles.emplace_back(i, next + 6, next);
+    mesh.triangles.emplace_back(i, i + 6, next + 6);
+  }
+  constexpr int kSide[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {3, 4, 5}};
+  for (const auto& part : kSide) {
+    mesh.triangles.emplace_back(part[0], part[1], part[2]);  // seen from -y
+    mesh.triangles.emplace_back(part[0] + 6, part[2] + 6, part[1] + 6);
+  }
+  return mesh;
+}
+
+// Both levels of it, from above, short of the ends.
+View from_above(std::uint64_t seed) {
+  View view;
+  Random random(seed, "step view", 0);
+  for (double x = -50.0 + random.uniform(0.0, 1.0); x < 40.0; x += 1.0) {
+    for (double y = -30.0 + random.uniform(0.0, 1.0); y < 30.0; y += 1.0) {
+      const double z = (x < 0.0 ? 30.0 : 0.0) + kNoise * random.normal();
+      view.segment_in_scan.positions.push_back(Eigen::Vector3d(x, y, z).cast<float>());
+      view.segment_in_scan.normals.push_back(Eigen::Vector3f::UnitZ());
+    }
+  }
+  view.noise_sigma_mm = kNoise;
+  view.viewpoint.kind = scan::Viewpoint::Kind::point;
+  view.viewpoint.value = {0.0, 0.0, 2000.0};
+  return view;
+}
+
+// Nothing holds views from above along the step. One lies 8 mm further along it, so that the others saw through its
+// upper level; but nine tenths of it lie on the CAD: it has strayed, and is no wrong pose that had to be dropped first.
+TEST(LooseViews, AreAskedOfTheModelWhereOneHasStrayedOnIt) {
+  const TriangleMesh mesh = step();
+  const model::SurfaceDistance surface(mesh);
+  std::vector<View> views;
+  std::vector<Link> links;
+  for (int v = 0; v < 5; ++v) {
+    views.push_back(from_above(static_cast<std::uint64_t>(v)));
+    for (int other = 0; other < v; ++other) links.push_back({other, v});
+  }
+  views[4].model_from_scan.translation().x() = 8.0;
+  RefineOptions by_scans;
+  by_scans.loose_on_model = false;
+  const Refinement alone = refine(views, links, by_scans, Context(2)).value();
+  const auto contradicted = view_against_others(views, links, alone, Context(2)).value();
+  ASSERT_TRUE(contradicted.has_value());
+  EXPECT_EQ(*contradicted, 4);
+  EXPECT_TRUE(refine_on_model(views, links, surface, diameter(mesh), {}, Context(2))->on_model);
 }
 
 TEST(LooseViews, NeedOneFitEach) {
