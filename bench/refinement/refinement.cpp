@@ -18,11 +18,11 @@ namespace asbuilt::bench {
 namespace {
 
 struct Arguments {
-  std::filesystem::path out;
+  std::filesystem::path out, cad;
   std::vector<std::string> folders, settings;
   std::vector<int> scans{8, 128}, own;
   double angle = 0.0, shift = 0.0;
-  int seeds = 10, count = 40, first = 0, scenes = 20, threads = 0;
+  int seeds = 10, count = 40, first = 0, scenes = 20, points = 60000, threads = 0;
 };
 
 Result<void> append(const Arguments& args, const std::vector<Trial>& trials) {
@@ -50,12 +50,19 @@ Result<void> for_each_folder(const Arguments& args, const Trials& trials_of) {
   return {};
 }
 
+// Parts that --cad names, or our own.
+Result<std::vector<ScenePart>> scene_parts(const Arguments& args) {
+  if (!args.cad.empty()) return cad_scene_parts(args.cad);
+  return own_scene_parts();
+}
+
 Result<void> run_own(const Arguments& args) {
   const Context context(args.threads);
-  for (int number = 0; number < args.scenes; ++number) {
-    ASBUILT_TRY(scene, own_scene(number, context));
+  ASBUILT_TRY(parts, scene_parts(args));
+  for (int number = args.first; number < args.first + args.scenes; ++number) {
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
     ASBUILT_TRY(trials, start_trials(scene, 1, context));
-    for (Trial& trial : trials) trial.kind = "own";
+    for (Trial& trial : trials) trial.kind = args.cad.empty() ? "own" : "cad";
     ASBUILT_CHECK(append(args, trials));
   }
   return {};
@@ -75,8 +82,9 @@ Result<void> run_wrong(const Arguments& args) {
     ASBUILT_TRY(scene, scene_of_folder(folder, context));
     ASBUILT_CHECK(run_on(scene));
   }
+  ASBUILT_TRY(parts, scene_parts(args));
   for (int number = 0; number < args.scenes; ++number) {
-    ASBUILT_TRY(scene, own_scene(number, context));
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
     ASBUILT_CHECK(run_on(scene));
   }
   return {};
@@ -143,8 +151,9 @@ Result<void> run_one(const Arguments& args) {
   };
   ASBUILT_CHECK(for_each_folder(args, one));
   const Context context(args.threads);
+  ASBUILT_TRY(parts, scene_parts(args));
   for (const int number : args.own) {
-    ASBUILT_TRY(scene, own_scene(number, context));
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
     ASBUILT_CHECK(one(scene, context));
   }
   return {};
@@ -177,6 +186,9 @@ int run(int argc, char** argv) {
   for (CLI::App* command : {starts, peer}) command->add_option("--seeds", args.seeds);
   wrong->add_option("--count", args.count, "trials a set");
   own->add_option("--scenes", args.scenes);
+  own->add_option("--first", args.first, "first scene");
+  for (CLI::App* command : {own, wrong, one})
+    command->add_option("--cad", args.cad, "scenes of the parts of this folder");
   scale->add_option("--scans", args.scans);
   one->add_option("--set", args.settings, "NAME=NUMBER");
   one->add_option("--angle", args.angle);

@@ -180,6 +180,7 @@ Result<void> write_summary(const std::filesystem::path& folder) {
   ASBUILT_TRY(groups, read_groups(folder / "trials.jsonl"));
   const std::string tables = start_table(groups, "start", "Given scenes, true segments") +
                              start_table(groups, "own", "Own scenes, as-built deviation 0.2 to 1 % of the diameter") +
+                             start_table(groups, "cad", "The same of the parts of the CAD folder") +
                              wrong_table(groups) +
                              simple_table(groups, "ablation", "Each switch turned over, 1 degree and 1 % off") +
                              simple_table(groups, "scale", "Many scans, 1 degree and 1 % off") +

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "../detection/parts.h"
 #include "../stopwatch.h"
 #include "asbuilt/core/random.h"
 #include "asbuilt/graph/pose_graph.h"
@@ -228,25 +229,29 @@ Result<Trial> wrong_trial(const RefinementScene& scene, int seed, const Context&
   return trial;
 }
 
-Result<RefinementScene> own_scene(int number, const Context& context) {
-  struct OwnPart {
-    const char* name;
-    TriangleMesh mesh;
-  };
-  const auto part = [&]() -> OwnPart {
-    switch (number % 3) {
-      case 0:
-        return {"valve_body", simulate::valve_body()};
-      case 1:
-        return {"stepped_block", simulate::stepped_block()};
-      default:
-        return {"l_profile", simulate::l_profile(120.0, 80.0, 12.0, 300.0)};
-    }
-  }();
+std::vector<ScenePart> own_scene_parts() {
+  return {{"valve_body", simulate::valve_body()},
+          {"stepped_block", simulate::stepped_block()},
+          {"l_profile", simulate::l_profile(120.0, 80.0, 12.0, 300.0)}};
+}
+
+Result<std::vector<ScenePart>> cad_scene_parts(const std::filesystem::path& folder) {
+  ASBUILT_TRY(all, parts_of(folder));
+  std::vector<ScenePart> parts;
+  for (SuitePart& part : all) {
+    if (part.symmetries.empty()) parts.push_back({part.name, std::move(part.mesh)});
+  }
+  if (!parts.empty()) return parts;
+  return fail(ErrorCode::unreadable_input,
+              fmt::format("{}: holds none of the CAD files that bench/README.md lists", folder.string()));
+}
+
+Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points, const Context& context) {
+  const ScenePart& part = parts[static_cast<std::size_t>(number) % parts.size()];
   Random random(static_cast<std::uint64_t>(number), "own scene", 0);
   simulate::SimulateOptions options;
   options.scans = 8;
-  options.points = 60000;
+  options.points = points;
   options.seed = static_cast<std::uint64_t>(number) + 1;
   options.pose = "any";
   options.clutter_objects = 4;

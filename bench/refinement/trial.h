@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -14,7 +15,7 @@ namespace asbuilt::bench {
 
 /// One run of the suite and what came out. Lengths in units of the sensor's noise where the name says sigma.
 struct Trial {
-  std::string kind;  ///< "start", "own", "wrong", "scale", "ablation", "peer"
+  std::string kind;  ///< "start", "own", "cad", "wrong", "scale", "ablation", "peer"
   std::string scene, variant;
   std::uint64_t seed = 0;
   std::map<std::string, double> figures;
@@ -47,8 +48,22 @@ struct JointRun {
 /// Which view and how follows from `seed`; of four seeds in a row three are plausible.
 [[nodiscard]] Result<Trial> wrong_trial(const RefinementScene& scene, int seed, const Context& context);
 
-/// A scene of our own simulator: part `number` with an as-built deviation of 0.2 to 1 % of the diameter.
-[[nodiscard]] Result<RefinementScene> own_scene(int number, const Context& context);
+/// A part that scenes are made of.
+struct ScenePart {
+  std::string name;
+  TriangleMesh mesh;  ///< CAD, mm
+};
+
+/// Three that are made by code: a valve body, a stepped block and a profile.
+[[nodiscard]] std::vector<ScenePart> own_scene_parts();
+
+/// The parts of a folder of CAD files (bench/README.md) that no motion maps onto themselves.
+[[nodiscard]] Result<std::vector<ScenePart>> cad_scene_parts(const std::filesystem::path& folder);
+
+/// Scene `number` of our own simulator, of part `number` modulo their count, with an as-built deviation of 0.2 to 1 %
+/// of the diameter, 8 scans of `points` points. `parts` may not be empty.
+[[nodiscard]] Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points,
+                                                const Context& context);
 
 /// Many scans of one part, from 1 degree and 1 % off: time against the number of scans, with the links of a scan capped
 /// at 8 and, up to 128 scans, not capped. The smallest number runs first and last.
