@@ -34,6 +34,7 @@ Result<refine::View> true_view(const std::vector<Eigen::Vector3f>& points, const
   view.model_from_scan = model_from_scan;
   view.noise_sigma_mm = scan.noise_sigma_mm;
   view.viewpoint = scan.viewpoint;
+  view.spacing_mm = scan.spacing_mm;
   view.beside_occluder = scan::Occluders(scan).beside(view.segment_in_scan, context);
   return view;
 }

@@ -105,7 +105,7 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
                                                     options, context));
     ASBUILT_TRY(suspect, refine::view_against_others(together, links, refinement, context));
     if (suspect && round > 1) {
-      const int at = members[static_cast<std::size_t>(*suspect)];
+      const int at = members[static_cast<std::size_t>(suspect->view)];
       run.dropped.push_back(left[static_cast<std::size_t>(at)]);
       left.erase(left.begin() + at);
       views = start;

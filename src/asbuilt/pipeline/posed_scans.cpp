@@ -71,6 +71,7 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
     const PosedScan& scan = scans[static_cast<std::size_t>(member)];
     views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
     if (scan.taken_from.empty()) views.back().beside_occluder = scan.beside_occluder;
+    views.back().spacing_mm = scan.spacing_mm;
   }
   return views;
 }
@@ -202,29 +203,21 @@ void restore_seen_through(std::vector<PosedScan>& scans) {
 
 Result<std::optional<Contradiction>> contradiction_in(const RefinedComponent& component,
                                                       const std::vector<PosedScan>& scans, const Context& context) {
-  const auto count = static_cast<int>(component.members.size());
-  const auto member = [&](int view) { return component.members[static_cast<std::size_t>(view)]; };
   const std::vector<refine::View> views = views_of(component.members, scans);
-  ASBUILT_TRY(evidence, refine::link_evidence(views, component.refinement.model_from_scan, component.links, context));
-  if (const auto contradicted = refine::contradicted_view(count, evidence)) {
-    return Contradiction{
-        member(contradicted->view),
-        fmt::format("where its pose puts it, {:.1f} % of what it shares with the scans it overlaps was "
-                    "seen through; among those it is {:.1f} %",
-                    100.0 * contradicted->share, 100.0 * contradicted->usual_share)};
+  ASBUILT_TRY(found, refine::view_against_others(views, component.links, component.refinement, context));
+  if (!found) return std::optional<Contradiction>();
+  Contradiction contradiction{component.members[static_cast<std::size_t>(found->view)], {}};
+  if (const auto& seen_through = found->seen_through) {
+    contradiction.reason = fmt::format(
+        "where its pose puts it, {:.1f} % of what it shares with the scans it overlaps was seen through; among those it "
+        "is {:.1f} %",
+        100.0 * seen_through->share, 100.0 * seen_through->usual_share);
+  } else if (const auto& differing = found->differing) {
+    contradiction.reason = fmt::format(
+        "under its pose it differs from the scans it overlaps by {:.3g} mm, they from one another by {:.3g} mm",
+        differing->spread_mm, differing->others_spread_mm);
   }
-  // Two scans of one part never agree better than noise and spacing let them.
-  double floor_mm = 0.0;
-  for (const int each : component.members) {
-    const PosedScan& scan = scans[static_cast<std::size_t>(each)];
-    floor_mm = std::max(floor_mm, std::max(scan.noise_sigma_mm, 0.1 * scan.spacing_mm));
-  }
-  const auto suspicious = refine::suspicious_view(count, component.refinement.edges, floor_mm);
-  if (!suspicious) return std::optional<Contradiction>();
-  return Contradiction{member(suspicious->view),
-                       fmt::format("under its pose it differs from the scans it overlaps by {:.3g} mm, they from one "
-                                   "another by {:.3g} mm",
-                                   suspicious->spread_mm, suspicious->others_spread_mm)};
+  return std::optional<Contradiction>(std::move(contradiction));
 }
 
 }  // namespace asbuilt::pipeline

@@ -30,7 +30,7 @@ Result<Refinement> refine_on_model(std::span<const View> views, std::span<const 
   // A view that the scans contradict either lies off the CAD, even fitted to it, and stands wrong, or has strayed along
   // what nothing holds. The first is to be dropped: held on the CAD it would stand as firmly as the right ones.
   ASBUILT_TRY(contradicted, view_against_others(views, links, *by_scans, context));
-  if (contradicted && on_model[static_cast<std::size_t>(*contradicted)].share_off > kMostOff) return by_scans;
+  if (contradicted && on_model[static_cast<std::size_t>(contradicted->view)].share_off > kMostOff) return by_scans;
   ASBUILT_TRY(with_model, refine(views, links, options, context, on_model));
   with_model.rms_before_mm = by_scans->rms_before_mm;
   with_model.iterations += by_scans->iterations;

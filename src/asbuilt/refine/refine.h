@@ -21,6 +21,7 @@ struct View {
   double noise_sigma_mm = 0.0;  ///< 0: unknown
   scan::Viewpoint viewpoint{};  ///< in the scan frame, if known
   std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
+  double spacing_mm = 0.0;  ///< of the scan's points; 0: unknown. Two scans agree no better than a tenth of it
 };
 
 /// Where one scan's own points fit the CAD best, and how well they hold it there.

@@ -8,7 +8,6 @@
 
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/median.h"
-#include "asbuilt/refine/link_evidence.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -16,6 +15,7 @@ namespace {
 constexpr std::size_t kMinCandidates = 50;  // fewer say nothing about an edge
 constexpr double kWorseThanUsual = 3.0, kWorseThanWorst = 2.0, kConsistent = 1.5;
 constexpr int kMinOthers = 3, kMinNeighbours = 2;
+constexpr double kAgreeInSpacings = 0.1;  // two scans of one part never agree better than that, nor than the noise
 
 // Size of the largest group of views, `without` left out, that edges of at most `limit` hold together.
 int largest_consistent_group(int view_count, std::span<const EdgeResidual> edges, int without, double limit) {
@@ -56,15 +56,22 @@ std::optional<SuspiciousView> suspicious_view(int view_count, std::span<const Ed
   return worst;
 }
 
-Result<std::optional<int>> view_against_others(std::span<const View> views, std::span<const Link> links,
-                                               const Refinement& refinement, const Context& context) {
+Result<std::optional<ViewAgainstOthers>> view_against_others(std::span<const View> views, std::span<const Link> links,
+                                                             const Refinement& refinement, const Context& context) {
   const auto count = static_cast<int>(views.size());
+  std::optional<ViewAgainstOthers> found;
   ASBUILT_TRY(evidence, link_evidence(views, refinement.model_from_scan, links, context));
-  if (const auto contradicted = contradicted_view(count, evidence)) return contradicted->view;
-  double noise_mm = 0.0;
-  for (const View& view : views) noise_mm = std::max(noise_mm, view.noise_sigma_mm);
-  const auto suspicious = suspicious_view(count, refinement.edges, noise_mm);
-  return suspicious ? std::optional<int>(suspicious->view) : std::nullopt;
+  if (const auto seen_through = contradicted_view(count, evidence)) {
+    found = ViewAgainstOthers{seen_through->view, seen_through, std::nullopt};
+    return found;
+  }
+  double floor_mm = 0.0;
+  for (const View& view : views)
+    floor_mm = std::max({floor_mm, view.noise_sigma_mm, kAgreeInSpacings * view.spacing_mm});
+  if (const auto differing = suspicious_view(count, refinement.edges, floor_mm)) {
+    found = ViewAgainstOthers{differing->view, std::nullopt, differing};
+  }
+  return found;
 }
 
 }  // namespace asbuilt::refine

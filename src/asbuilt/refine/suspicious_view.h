@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 
+#include "asbuilt/refine/link_evidence.h"
 #include "asbuilt/refine/refine.h"
 
 namespace asbuilt::refine {
@@ -26,9 +27,19 @@ struct SuspiciousView {
 [[nodiscard]] std::optional<SuspiciousView> suspicious_view(int view_count, std::span<const EdgeResidual> edges,
                                                             double floor_mm = 0.0);
 
+/// A view that the others contradict, and by what: one of the two.
+struct ViewAgainstOthers {
+  int view = 0;
+  std::optional<ContradictedView> seen_through;
+  std::optional<SuspiciousView> differing;
+};
+
 /// The view that the others contradict after `refinement`, by what they saw (contradicted_view) or else by its
-/// residuals (suspicious_view, with the noise as floor). Errors: as link_evidence().
-[[nodiscard]] Result<std::optional<int>> view_against_others(std::span<const View> views, std::span<const Link> links,
-                                                             const Refinement& refinement, const Context& context);
+/// residuals (suspicious_view; the floor is the noise or a tenth of the spacing, of the coarsest view). Errors: as
+/// link_evidence().
+[[nodiscard]] Result<std::optional<ViewAgainstOthers>> view_against_others(std::span<const View> views,
+                                                                           std::span<const Link> links,
+                                                                           const Refinement& refinement,
+                                                                           const Context& context);
 
 }  // namespace asbuilt::refine

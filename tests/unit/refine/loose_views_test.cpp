@@ -179,7 +179,8 @@ TEST(LooseViews, AreAskedOfTheModelWhereOneHasStrayedOnIt) {
   const Refinement alone = refine(views, links, by_scans, Context(2)).value();
   const auto contradicted = view_against_others(views, links, alone, Context(2)).value();
   ASSERT_TRUE(contradicted.has_value());
-  EXPECT_EQ(*contradicted, 4);
+  EXPECT_EQ(contradicted->view, 4);
+  EXPECT_TRUE(contradicted->seen_through.has_value());
   EXPECT_TRUE(refine_on_model(views, links, surface, diameter(mesh), {}, Context(2))->on_model);
 }
 
