@@ -227,4 +227,24 @@ ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const
   return {1.4826 * median_of(std::move(residuals)), median_of(std::move(sines))};
 }
 
+RimResiduals rim_residuals(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
+                           double most_mm) {
+  const SampledView& from = view_at(views, edge.source);
+  const SampledView& to = view_at(views, edge.target);
+  RimResiduals sums;
+  if (from.near_rim.empty() || to.near_rim.empty()) return sums;
+  const Pose to_from_from = target_from_source(edge, poses);
+  for (const Match& match : edge.matches) {
+    const bool beside = to.near_rim[match.target] != 0;
+    if (!beside && from.near_rim[match.source] != 0) continue;
+    const Eigen::Vector3d p = to_from_from * from.points.positions[match.source].cast<double>();
+    const double residual =
+        to.points.normals[match.target].cast<double>().dot(p - to.points.positions[match.target].cast<double>());
+    if (std::abs(residual) > most_mm) continue;
+    (beside ? sums.beside_mm : sums.inside_mm) += residual;
+    ++(beside ? sums.beside : sums.inside);
+  }
+  return sums;
+}
+
 }  // namespace asbuilt::refine

@@ -62,4 +62,13 @@ struct ResidualStatistics {
 [[nodiscard]] ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const SampledView> views,
                                                      std::span<const Pose> poses);
 
+/// Sums of signed residuals: of matches with planes beside a rim of the target, and of those in which neither point is
+/// beside one. What stands off further than `most_mm` is left out. Where views do not know their rims: nothing.
+struct RimResiduals {
+  double beside_mm = 0.0, inside_mm = 0.0;  ///< sums
+  std::size_t beside = 0, inside = 0;       ///< matches
+};
+[[nodiscard]] RimResiduals rim_residuals(const DirectedEdge& edge, std::span<const SampledView> views,
+                                         std::span<const Pose> poses, double most_mm);
+
 }  // namespace asbuilt::refine

@@ -36,6 +36,9 @@ constexpr double kAlikeInRadii = 0.4;               // of a view: so far apart, 
 constexpr double kOverclaimed = 3.0;                // squared errors of links / their squared claims
 constexpr double kFirmInScales = 1.0;               // standard deviation of a view, in units of noise
 constexpr int kStepsAtFullReach = 2;                // with the CAD
+constexpr double kRimBias = 0.02;                   // of the noise, as large as the mean of 2500 matches errs anyway
+constexpr double kRimsClipped = 3.0;                // scales: outliers say nothing of a bias
+constexpr std::size_t kEnoughOfRims = 1000;         // matches, to see a bias of that size
 constexpr double kKeepSpacings = 0.05;              // a motion by which hardly a point changes its nearest neighbour
 
 double squared(double x) { return x * x; }
@@ -268,6 +271,37 @@ class JointRefinement {
     return searched;
   }
 
+  // Rims count little until the views have settled; then it shows whether planes beside them stand off in the mean, as
+  // where the sensor mixed the part with what is behind it or normals lean. As a bias does not average out, they
+  // count by it against the noise of a mean. Gives whether anything has changed.
+  bool weigh_rims_by_bias() {
+    if (!options_.rim_weights || std::exchange(rims_weighed_, true)) return false;
+    std::vector<RimResiduals> residuals(edges_.size());
+    parallel_for(context_, edges_.size(), 1, [&](std::size_t e) {
+      residuals[e] = rim_residuals(edges_[e], views_, poses_, kRimsClipped * usual_scale_);
+    });
+    RimResiduals sums;
+    for (const RimResiduals& edge : residuals) {
+      sums.beside_mm += edge.beside_mm;
+      sums.inside_mm += edge.inside_mm;
+      sums.beside += edge.beside;
+      sums.inside += edge.inside;
+    }
+    if (std::min(sums.beside, sums.inside) < kEnoughOfRims || !(usual_scale_ > 0.0)) return false;
+    const double bias_mm =
+        sums.beside_mm / static_cast<double>(sums.beside) - sums.inside_mm / static_cast<double>(sums.inside);
+    const auto weight = static_cast<float>(1.0 / (1.0 + squared(bias_mm / (kRimBias * usual_scale_))));
+    bool changed = false;
+    for (SampledView& view : views_) {
+      for (std::size_t i = 0; i < view.near_rim.size(); ++i) {
+        if (view.near_rim[i] == 0 || weight <= view.weight[i]) continue;
+        view.weight[i] = weight;
+        changed = true;
+      }
+    }
+    return changed;
+  }
+
   // How far the reach has to shrink yet.
   [[nodiscard]] double to_go(const DirectedEdge& edge) const {
     return edge.reach_mm - kReachInSpacings * target(edge).spacing_mm;
@@ -480,6 +514,8 @@ class JointRefinement {
       afresh = settled && quiet && !coarse && searched < edges_.size();
       if (!settled || !quiet || afresh) continue;  // kept matches have the last word only if new ones agree
       if (!coarse) {
+        afresh = weigh_rims_by_bias();
+        if (afresh) continue;
         result.converged = true;
         break;
       }
@@ -677,6 +713,7 @@ class JointRefinement {
   double diameter_ = 0.0;
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
   double damping_ = 0.0;
+  bool rims_weighed_ = false;  // by what is seen of them
 };
 
 }  // namespace

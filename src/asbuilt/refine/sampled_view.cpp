@@ -106,20 +106,16 @@ std::vector<char> near_marked(std::span<const std::uint8_t> marked, const PointC
 // biased rather than noisy. It counts so little that it decides nothing where there are others, but not nothing: where
 // two scans share only their rims, these still hold them together. Of a part of small features nearly all is near a
 // rim, among it what holds the pose best: at most half of a view's weight is given up.
-std::vector<float> rim_weights(const SampledView& view, const std::vector<Place>& places, double scan_spacing_mm,
-                               const Context& context) {
+void weigh_rims(SampledView& view, const std::vector<Place>& places, double scan_spacing_mm, const Context& context) {
   constexpr double kNearRim = 0.03, kLeastLeft = 0.5;
   std::vector<std::uint8_t> rim(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) rim[i] = places[i] == Place::rim ? 1 : 0;
-  const std::vector<char> near_rim =
-      near_marked(rim, view.points, view.points, kRimInSpacings * scan_spacing_mm, context);
-  const auto all = static_cast<double>(near_rim.size());
-  const auto near = static_cast<double>(std::ranges::count(near_rim, 1));
+  view.near_rim = near_marked(rim, view.points, view.points, kRimInSpacings * scan_spacing_mm, context);
+  const auto all = static_cast<double>(view.near_rim.size());
+  const auto near = static_cast<double>(std::ranges::count(view.near_rim, 1));
   const double wanted = near > 0.0 ? (kLeastLeft * all - (all - near)) / near : 1.0;
   const auto weight = static_cast<float>(std::max(kNearRim, wanted));
-  std::vector<float> weights(places.size());
-  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = near_rim[i] != 0 ? weight : 1.0F;
-  return weights;
+  for (std::size_t i = 0; i < view.weight.size(); ++i) view.weight[i] = view.near_rim[i] != 0 ? weight : 1.0F;
 }
 
 // Beside an edge, on a boss and in a dent a normal leans, and the plane through the point is nobody's.
@@ -195,7 +191,7 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
   view.weight.assign(view.points.size(), 1.0F);
   if ((rules.rim_weights || rules.rim_matches) && view.spacing_mm > 0.0) {
     const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
-    if (rules.rim_weights) view.weight = rim_weights(view, places, median_spacing(segment.positions), context);
+    if (rules.rim_weights) weigh_rims(view, places, median_spacing(segment.positions), context);
     if (rules.rim_matches && beside_occluder.size() == segment.size()) {
       const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder, context);
       view.on_flat_face = on_flat_faces(view, context);

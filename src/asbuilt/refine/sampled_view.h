@@ -36,6 +36,7 @@ struct SampledView {
   PointCloud points;                  ///< 20-30 k evenly spread points
   std::vector<std::uint32_t> coarse;  ///< an even subset of `points` for the first steps
   std::vector<float> weight;          ///< of each point, in (0, 1]
+  std::vector<char> near_rim;         ///< of each point, where rims are weighed: its weight is that of rims
   RimPoints rims;                     ///< where its flat faces end
   std::vector<char> on_flat_face;     ///< of each point, where rims are matched: its neighbours have its normal
   double spacing_mm = 0.0;
