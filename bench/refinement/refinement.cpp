@@ -187,8 +187,10 @@ int run(int argc, char** argv) {
   wrong->add_option("--count", args.count, "trials a set");
   own->add_option("--scenes", args.scenes);
   own->add_option("--first", args.first, "first scene");
-  for (CLI::App* command : {own, wrong, one})
+  for (CLI::App* command : {own, wrong, one}) {
     command->add_option("--cad", args.cad, "scenes of the parts of this folder");
+    command->add_option("--points", args.points, "of a scan of our own simulator");
+  }
   scale->add_option("--scans", args.scans);
   one->add_option("--set", args.settings, "NAME=NUMBER");
   one->add_option("--angle", args.angle);
