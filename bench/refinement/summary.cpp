@@ -93,8 +93,7 @@ std::string start_table(const std::vector<Group>& groups, const std::string& kin
   if (rows.empty()) return {};
   return fmt::format(
       "## {}\n\n| scene | start off by | scans | error, median (sigma) | worst | of scans fitted to the true surface "
-      "one "
-      "by one | ratio to oracle, worst | within 0.1 sigma of the run from the truth | seconds, median |\n"
+      "one by one | ratio to oracle, worst | within 0.1 sigma of the run from the truth | seconds, median |\n"
       "|---|---|---|---|---|---|---|---|---|\n{}\n",
       title, rows);
 }

@@ -209,9 +209,8 @@ Result<std::optional<Contradiction>> contradiction_in(const RefinedComponent& co
   Contradiction contradiction{component.members[static_cast<std::size_t>(found->view)], {}};
   if (const auto& seen_through = found->seen_through) {
     contradiction.reason = fmt::format(
-        "where its pose puts it, {:.1f} % of what it shares with the scans it overlaps was seen through; among those "
-        "it "
-        "is {:.1f} %",
+        "where its pose puts it, {:.1f} % of what it shares with the scans it overlaps was seen through; "
+        "among those it is {:.1f} %",
         100.0 * seen_through->share, 100.0 * seen_through->usual_share);
   } else if (const auto& differing = found->differing) {
     contradiction.reason = fmt::format(
