@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "asbuilt/pipeline/mirror_image.h"
 #include "asbuilt/verify/instances.h"
 #include "asbuilt/verify/verdict.h"
 
@@ -55,6 +56,13 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     ++found.looks;
     return voted;
   };
+  const auto mirrored = [&] {
+    Result<void> asked;
+    timed("verify", [&] {
+      asked = reject_mirror_images(found.placements, scan, model, codebook, options, context);
+    });
+    return asked;
+  };
   const int first = options.detect.first_reference_points, all = options.detect.reference_points;
 
   if (options.instances == Instances::all) {
@@ -65,6 +73,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     });
     if (!placements) return tl::unexpected(placements.error());
     found.placements = std::move(*placements);
+    ASBUILT_CHECK(mirrored());
     return found;
   }
 
@@ -98,6 +107,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     if (!detection) return tl::unexpected(detection.error());
   }
   found.placements.push_back(std::move(*detection));
+  ASBUILT_CHECK(mirrored());
   return found;
 }
 

@@ -28,6 +28,13 @@ class SpacingByRange {
   /// first and the last as there. Precondition: known().
   [[nodiscard]] double at(const Eigen::Vector3d& point_in_scan) const;
 
+  /// The same of the points in a mirror at x = 0.
+  [[nodiscard]] SpacingByRange mirrored() const {
+    SpacingByRange result = *this;
+    result.viewpoint_.x() = -viewpoint_.x();
+    return result;
+  }
+
  private:
   Eigen::Vector3d viewpoint_ = Eigen::Vector3d::Zero();
   std::vector<double> ranges_mm_, spacings_mm_;  // of the bands; ranges increase

@@ -21,6 +21,7 @@ enum class Reason {
   weak_evidence,      ///< nothing speaks clearly against the pose, but score, fit and normals together prove too little
   under_constrained,  ///< what was found (a plane, say) would hold in other poses as well
   too_few_points,     ///< too little of the part in the scan to prove anything
+  mirror_image,       ///< the part's mirror image would explain the scan better
   ambiguous_pose,     ///< a different pose explains the scan about as well
   second_instance,    ///< two placements of the part
   scan_too_small,     ///< size contradiction: probably a wrong unit

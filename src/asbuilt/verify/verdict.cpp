@@ -362,6 +362,8 @@ const char* code_of(Reason reason) {
       return "weak_evidence";
     case Reason::too_few_points:
       return "too_few_points";
+    case Reason::mirror_image:
+      return "mirror_image";
     case Reason::ambiguous_pose:
       return "ambiguous_pose";
     case Reason::second_instance:
@@ -413,8 +415,12 @@ bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options) {
   return detection.status == Status::accepted && !options.paper_mode && is_beyond_doubt(detection.best, options);
 }
 
+bool is_one_place(double distance_of_centres_mm, const model::PreparedModel& model) {
+  return distance_of_centres_mm <= kSamePlace * model.diameter;
+}
+
 bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
-  return distance_of_centres_mm(a, b, model) <= kSamePlace * model.diameter;
+  return is_one_place(distance_of_centres_mm(a, b, model), model);
 }
 
 bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,

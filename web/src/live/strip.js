@@ -8,7 +8,7 @@ const looks = { accepted: 'pass', rejected: 'fail', failed: 'fail', dropped: 'fa
 export const look_of = (scan) => looks[scan.status] ?? 'none';
 export const key_of = (scan) => `${scan.file}\n${scan.index_in_file}\n${scan.instance}`;
 /** What a card says of a scan that is not used: its sheet and the big line tell more. */
-const reasons = { no_hypothesis: 'part not found', low_score: 'part not found', poor_fit: 'part not found', normals_disagree: 'part not found', free_space_violated: 'part not found', contradicted: 'part not found',
+const reasons = { no_hypothesis: 'part not found', low_score: 'part not found', poor_fit: 'part not found', normals_disagree: 'part not found', free_space_violated: 'part not found', contradicted: 'part not found', mirror_image: 'its mirror image',
   weak_evidence: 'too little of the part', too_few_points: 'too little of the part', under_constrained: 'too little of the part', scan_too_small: 'scan too small', ambiguous_pose: 'two poses fit', second_instance: 'two parts in it',
   contradicted_by_scans: 'others contradict it', unreadable: 'cannot be read' };
 const share = (value) => (typeof value === 'number' ? percent(value / 100, 1) : '');
