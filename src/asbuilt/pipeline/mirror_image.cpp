@@ -26,22 +26,14 @@ Reflection reflection(Eigen::Index axis, double at) {
   return result;
 }
 
-Eigen::Vector3d centre_in_scan(const verify::Candidate& candidate, const model::PreparedModel& model) {
-  return candidate.model_from_scan.inverse() * model.box.center();
-}
-
-// A part of the other hand, where this one is said to be: mirrored at a plane through the middle of its box.
-void add_mirror_images(const verify::Candidate& candidate, const model::PreparedModel& model,
-                       std::vector<detect::Hypothesis>& hypotheses) {
-  const Reflection scan_from_mirrored = reflection(0, 0.0);
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const Reflection mirrored =
-        reflection(axis, model.box.center()[axis]) * candidate.model_from_scan * scan_from_mirrored;
-    Pose model_from_mirrored = Pose::Identity();
-    model_from_mirrored.linear() = mirrored.linear();
-    model_from_mirrored.translation() = mirrored.translation();
-    hypotheses.push_back({model_from_mirrored, candidate.votes});
-  }
+// A pose in the scan for one in the mirrored scan, or the other way round: the part mirrored at a plane through the
+// middle of its box, which stays where it is.
+Pose in_mirror(const Pose& model_from_scan, const model::PreparedModel& model, Eigen::Index axis) {
+  const Reflection mirrored = reflection(axis, model.box.center()[axis]) * model_from_scan * reflection(0, 0.0);
+  Pose result = Pose::Identity();
+  result.linear() = mirrored.linear();
+  result.translation() = mirrored.translation();
+  return result;
 }
 
 }  // namespace
@@ -60,20 +52,22 @@ Result<void> reject_mirror_images(std::vector<verify::Detection>& placements, co
   ASBUILT_CHECK(search.vote(std::max(options.detect.first_reference_points, 1), context));
   std::vector<detect::Hypothesis> hypotheses = search.hypotheses(options.detect.first_hypotheses, context);
   for (const verify::Detection& placement : placements) {
-    if (is_doubtful(placement)) add_mirror_images(placement.best, model, hypotheses);
+    for (Eigen::Index axis = 0; axis < 3 && is_doubtful(placement); ++axis) {
+      hypotheses.push_back({in_mirror(placement.best.model_from_scan, model, axis), placement.best.votes});
+    }
   }
   const verify::Judge judge(mirrored, model, options.verify, context, {}, &sampled);
-  ASBUILT_TRY(in_mirror, judge.verdict_on(hypotheses, verify::Look::quick));
+  ASBUILT_TRY(rivals, judge.verdict_on(hypotheses, verify::Look::quick));
 
   for (verify::Detection& placement : placements) {
     if (!is_doubtful(placement)) continue;
-    const Eigen::Vector3d claimed = centre_in_scan(placement.best, model);
-    const auto better = std::ranges::find_if(in_mirror.candidates, [&](const verify::Candidate& c) {
-      const Eigen::Vector3d there = reflection(0, 0.0) * centre_in_scan(c, model);
+    const auto better = std::ranges::find_if(rivals.candidates, [&](const verify::Candidate& c) {
+      verify::Candidate there = c;
+      there.model_from_scan = in_mirror(c.model_from_scan, model, 0);
       return c.objection == verify::Reason::none && c.support > kClearlyMore * placement.best.support &&
-             verify::is_one_place((there - claimed).norm(), model);
+             verify::is_in_one_place(there, placement.best, model);
     });
-    if (better == in_mirror.candidates.end()) continue;
+    if (better == rivals.candidates.end()) continue;
     placement.status = verify::Status::rejected;
     placement.reason = verify::Reason::mirror_image;
     placement.explanation = fmt::format(

@@ -415,12 +415,8 @@ bool is_beyond_doubt(const Detection& detection, const VerifyOptions& options) {
   return detection.status == Status::accepted && !options.paper_mode && is_beyond_doubt(detection.best, options);
 }
 
-bool is_one_place(double distance_of_centres_mm, const model::PreparedModel& model) {
-  return distance_of_centres_mm <= kSamePlace * model.diameter;
-}
-
 bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model) {
-  return is_one_place(distance_of_centres_mm(a, b, model), model);
+  return distance_of_centres_mm(a, b, model) <= kSamePlace * model.diameter;
 }
 
 bool is_second_instance(const Candidate& best, const Candidate& rival, const model::PreparedModel& model,

@@ -36,8 +36,7 @@ namespace asbuilt::verify {
 /// Clutter that passes the thresholds alone is not a second part beside a clear first.
 [[nodiscard]] bool is_comparable(const Candidate& rival, const Candidate& best);
 
-/// Whether centres of the part so far apart are at about the same place.
-[[nodiscard]] bool is_one_place(double distance_of_centres_mm, const model::PreparedModel& model);
+/// Whether the part's centre is at about the same place in both.
 [[nodiscard]] bool is_in_one_place(const Candidate& a, const Candidate& b, const model::PreparedModel& model);
 
 /// Whether an accepted pose clears every limit by so much that searching the scan further could not unsettle it.

@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include <utility>
+#include <memory>
+#include <numbers>
+#include <vector>
 
 #include "asbuilt/scan/mirrored.h"
+#include "asbuilt/simulate/mesh_edit.h"
 #include "asbuilt/simulate/simulate.h"
 #include "asbuilt/verify/verdict.h"
 #include "asbuilt/verify/verify.h"
@@ -18,11 +21,7 @@ using verify::Detection;
 using verify::Reason;
 using verify::Status;
 
-TriangleMesh mirrored(TriangleMesh mesh) {
-  for (Eigen::Vector3d& vertex : mesh.vertices) vertex.x() = -vertex.x();
-  for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
-  return mesh;
-}
+TriangleMesh mirrored(const TriangleMesh& mesh) { return simulate::scaled(mesh, {-1.0, 1.0, 1.0}); }
 
 // A scan of a part or its mirror image, and the part to be found in it.
 struct Scene {
