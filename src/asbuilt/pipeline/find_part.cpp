@@ -56,8 +56,9 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     ++found.looks;
     return voted;
   };
-  const auto mirrored = [&] {
+  const auto reject_mirrored = [&] {
     Result<void> asked;
+    if (!may_be_mirror_images(found.placements, options)) return asked;
     timed("verify", [&] {
       asked = reject_mirror_images(found.placements, scan, model, codebook, options, context);
     });
@@ -73,7 +74,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     });
     if (!placements) return tl::unexpected(placements.error());
     found.placements = std::move(*placements);
-    ASBUILT_CHECK(mirrored());
+    ASBUILT_CHECK(reject_mirrored());
     return found;
   }
 
@@ -107,7 +108,7 @@ Result<FoundPart> find_part(const scan::Scan& scan, const model::PreparedModel& 
     if (!detection) return tl::unexpected(detection.error());
   }
   found.placements.push_back(std::move(*detection));
-  ASBUILT_CHECK(mirrored());
+  ASBUILT_CHECK(reject_mirrored());
   return found;
 }
 

@@ -28,7 +28,9 @@ using TimedStage = std::function<void(std::string_view stage, const std::functio
 
 /// Finds the part in a scan. A first look with few reference points (Sec. 3.1) is enough where the judge has no doubt
 /// about what it proposes; else more of them vote, and everything is judged again, what the first look left among it.
-/// If that is rejected, a last look takes many more, since in a hall hardly any of them lie on the part. Paper mode, and the search for all placements, look once and thoroughly.
+/// If that is rejected, a last look takes many more, since in a hall hardly any of them lie on the part. Paper mode, and
+/// the search for all placements, look once and thoroughly. What is found but not beyond doubt is held against its mirror
+/// image last.
 ///
 /// `starts` are poses of the user; they come first, with the votes of the best hypothesis.
 /// Errors: invalid_argument for options; cancelled.

@@ -36,15 +36,21 @@ Pose in_mirror(const Pose& model_from_scan, const model::PreparedModel& model, E
   return result;
 }
 
+bool is_doubtful(const verify::Detection& placement, const Options& options) {
+  return placement.status == verify::Status::accepted && !verify::is_beyond_doubt(placement, options.verify);
+}
+
 }  // namespace
+
+bool may_be_mirror_images(const std::vector<verify::Detection>& placements, const Options& options) {
+  return !options.paper_mode &&
+         std::ranges::any_of(placements, [&](const auto& placement) { return is_doubtful(placement, options); });
+}
 
 Result<void> reject_mirror_images(std::vector<verify::Detection>& placements, const scan::Scan& scan,
                                   const model::PreparedModel& model, const detect::Codebook& codebook,
                                   const Options& options, const Context& context) {
-  const auto is_doubtful = [&](const verify::Detection& placement) {
-    return placement.status == verify::Status::accepted && !verify::is_beyond_doubt(placement, options.verify);
-  };
-  if (options.paper_mode || std::ranges::none_of(placements, is_doubtful)) return {};
+  if (!may_be_mirror_images(placements, options)) return {};
 
   const scan::Scan mirrored = scan::mirrored(scan);
   const auto sampled = detect::sampled_scan(mirrored, model.sampling_distance, model.diameter, context);
@@ -52,7 +58,7 @@ Result<void> reject_mirror_images(std::vector<verify::Detection>& placements, co
   ASBUILT_CHECK(search.vote(std::max(options.detect.first_reference_points, 1), context));
   std::vector<detect::Hypothesis> hypotheses = search.hypotheses(options.detect.first_hypotheses, context);
   for (const verify::Detection& placement : placements) {
-    for (Eigen::Index axis = 0; axis < 3 && is_doubtful(placement); ++axis) {
+    for (Eigen::Index axis = 0; axis < 3 && is_doubtful(placement, options); ++axis) {
       hypotheses.push_back({in_mirror(placement.best.model_from_scan, model, axis), placement.best.votes});
     }
   }
@@ -60,7 +66,7 @@ Result<void> reject_mirror_images(std::vector<verify::Detection>& placements, co
   ASBUILT_TRY(rivals, judge.verdict_on(hypotheses, verify::Look::quick));
 
   for (verify::Detection& placement : placements) {
-    if (!is_doubtful(placement)) continue;
+    if (!is_doubtful(placement, options)) continue;
     const auto better = std::ranges::find_if(rivals.candidates, [&](const verify::Candidate& c) {
       verify::Candidate there = c;
       there.model_from_scan = in_mirror(c.model_from_scan, model, 0);

@@ -12,6 +12,10 @@
 
 namespace asbuilt::pipeline {
 
+/// Whether any placement is accepted, but not beyond doubt, so that `reject_mirror_images` would look at it. Never in
+/// paper mode.
+[[nodiscard]] bool may_be_mirror_images(const std::vector<verify::Detection>& placements, const Options& options);
+
 /// Rejects (`mirror_image`) the accepted placements in whose place the part's mirror image would explain the scan
 /// better: parts come left and right, and of one that is nearly its own mirror image, a part of the other hand shows
 /// hardly anything that the judge could hold against it on its own. The part is sought in the mirrored scan for that.
