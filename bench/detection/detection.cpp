@@ -10,10 +10,12 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "../program.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/mesh_file.h"
+#include "asbuilt/io/pose_file.h"
 #include "asbuilt/simulate/simulate.h"
 #include "cases.h"
 #include "curves.h"
@@ -32,7 +34,7 @@ struct Arguments {
   std::string mode = "default";
   std::vector<std::string> settings;
   std::filesystem::path write_scans;  ///< folder; empty: none is written
-  std::string only;  ///< group of parts that a summary is about; empty: all that were judged
+  std::string only;                   ///< group of parts that a summary is about; empty: all that were judged
 };
 
 io::OptionValue option_value(const std::string& text) {
@@ -86,6 +88,11 @@ Result<void> judge_cases(const Arguments& arguments) {
       if (!arguments.write_scans.empty()) {  // as `asbuilt detect` reads it, to look at it or to judge it alone
         const std::string name = fmt::format("{}_{}.ply", record.part, record.seed);
         ASBUILT_CHECK(simulate::write_points(arguments.write_scans / name, scan.points_in_scan.positions));
+        if (scan.model_from_scan) {
+          const std::vector<io::NamedPose> truth = {{name, *scan.model_from_scan}};
+          ASBUILT_CHECK(
+              io::write_poses_csv(arguments.write_scans / fmt::format("{}_{}.csv", record.part, record.seed), truth));
+        }
       }
       return judge(record, scan, part, *shared, options, context);
     };
@@ -170,8 +177,9 @@ int run(int argc, char** argv) {
       ->capture_default_str();
   cases->add_option("--set", arguments.settings, "NAME=VALUE for any option of the product, for ablations");
   cases
-      ->add_option("--write", arguments.write_scans,
-                   "folder for the scans themselves, as PART_SEED.ply, and the part, PART.ply")
+      ->add_option(
+          "--write", arguments.write_scans,
+          "folder for the scans themselves, as PART_SEED.ply, their true poses, PART_SEED.csv, and the part, PART.ply")
       ->check(CLI::ExistingDirectory);
   CLI::App* summary = app.add_subcommand("summary", "Figures of OUT/cases.jsonl: summary.json, summary.md, curves");
   summary->add_option("output", selection.output, "OUT")->required();

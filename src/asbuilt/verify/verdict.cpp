@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <optional>
 
@@ -428,6 +429,40 @@ bool is_second_instance(const Candidate& best, const Candidate& rival, const mod
 std::string second_instance_sentence(const Candidate& best, const Candidate& rival, const model::PreparedModel& model) {
   return fmt::format("the part stands in a second place, {:.0f} mm away, with score {:.2f} beside {:.2f}",
                      distance_of_centres_mm(best, rival, model), rival.score, best.score);
+}
+
+std::vector<Candidate> without_beaten_at_edges(std::vector<Candidate> candidates, const model::PreparedModel& model,
+                                               const VerifyOptions& options, const Comparison& compare) {
+  constexpr double kLeastLead = 2.0;  // measurements
+  if (options.paper_mode) return candidates;
+  std::ranges::stable_sort(candidates, std::ranges::greater{}, &Candidate::support);
+  std::vector<std::uint8_t> is_dropped(candidates.size(), 0);
+  const auto takes_part = [&](std::size_t i) {
+    return is_dropped[i] == 0 && !surface_holds(candidates[i], options) &&
+           objection(candidates[i], options).reason == Reason::none;
+  };
+  for (std::size_t first = 0; first < candidates.size(); ++first) {
+    if (!takes_part(first)) continue;
+    const auto counts_as_first = [&](std::size_t i) {
+      return displacement_modulo_mm(candidates[first].model_from_scan, candidates[i].model_from_scan, model) <=
+             kSamePose * model.diameter;
+    };
+    std::size_t leader = first;
+    for (std::size_t i = first + 1; i < candidates.size(); ++i) {
+      if (!takes_part(i) || !counts_as_first(i)) continue;
+      const PoseContrast seen = compare(candidates[leader], candidates[i]);
+      if (seen.for_second - seen.for_first > kLeastLead) leader = i;
+    }
+    for (std::size_t i = first; i < leader; ++i) {
+      if (takes_part(i) && counts_as_first(i)) is_dropped[i] = 1;
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (is_dropped[i] == 0) candidates[kept++] = candidates[i];
+  }
+  candidates.resize(kept);
+  return candidates;
 }
 
 Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options,

@@ -52,6 +52,13 @@ namespace asbuilt::verify {
 /// What the scan says where two candidates predict different things.
 using Comparison = std::function<PoseContrast(const Candidate& first, const Candidate& second)>;
 
+/// Of candidates that count as one and that only edges hold, support hardly tells which stands best: most of the surface
+/// is found at each. Drops those that have more support than the one that wins by what the edges show, `compare`,
+/// against all before it. Only candidates with nothing against them on their own take part.
+[[nodiscard]] std::vector<Candidate> without_beaten_at_edges(std::vector<Candidate> candidates,
+                                                             const model::PreparedModel& model,
+                                                             const VerifyOptions& options, const Comparison& compare);
+
 /// Decides from refined candidates: accepted, ambiguous or rejected, with the reason and the numbers. Rivals in the
 /// same place are told apart by `compare`, if it is there, else by their support alone. Rivals elsewhere make the pose
 /// ambiguous, unless it is to be `one_of_several`: then whether they are placements of their own is for the caller.

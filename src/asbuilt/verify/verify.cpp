@@ -370,10 +370,7 @@ class Judge::Verification {
     const auto is_loose = [&] {
       return !options_.paper_mode && candidate.weakest_direction < hold_needed(candidate.missing_share, options_);
     };
-    // What edges show is read as finely as this part fits, not as deviating parts may.
-    const double edge_distance =
-        std::clamp(kEdgeScatter * candidate.rms_mm, kFinestEdge * final_distance, final_distance);
-    const EvidenceOptions edge_options = options_within(candidate.model_from_scan, edge_distance);
+    const EvidenceOptions edge_options = options_at_edges(candidate);
     const auto settled = [&](const Pose& pose) {
       return settled_between_edges(pose, evidence, model_, hold_needed(candidate.missing_share, options_), evidence_,
                                    edge_options);
@@ -605,6 +602,13 @@ class Judge::Verification {
     return options_within(model_from_scan, std::max(least_distance_mm, final_distance_at(model_from_scan)));
   }
 
+  // What edges show is read as finely as this part fits, not as deviating parts may.
+  [[nodiscard]] EvidenceOptions options_at_edges(const Candidate& candidate) const {
+    const double final_distance = final_distance_at(candidate.model_from_scan);
+    return options_within(candidate.model_from_scan, std::clamp(kEdgeScatter * candidate.rms_mm,
+                                                                kFinestEdge * final_distance, final_distance));
+  }
+
   // Eq. 11 measures to the closest point; across the surface only, with room along it, is ours. Where surfaces are
   // looked at flatly, there is room up to what it is at the scan's median spacing.
   [[nodiscard]] EvidenceOptions options_within(const Pose& model_from_scan, double distance_mm) const {
@@ -670,11 +674,18 @@ Result<Detection> Judge::Verification::verdict_on(std::vector<Candidate> candida
   if (context_.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
 
   const auto compare = [&](const Candidate& first, const Candidate& second) { return contrast_of(first, second); };
-  Detection detection = decide(candidates, model_, options_, compare, one_of_several_);
+  const auto compare_edges = [&](const Candidate& first, const Candidate& second) {
+    return contrast(first.model_from_scan, second.model_from_scan, model_, evidence_, options_at_edges(first));
+  };
+  const auto decided = [&] {
+    return decide(without_beaten_at_edges(candidates, model_, options_, compare_edges), model_, options_, compare,
+                  one_of_several_);
+  };
+  Detection detection = decided();
   const bool may_be_another = detection.status == Status::accepted || detection.reason == Reason::under_constrained;
   if (may_be_another && add_attitudes_of(detection.best, candidates)) {
     if (context_.cancelled()) return fail(ErrorCode::cancelled, "stopped while verifying");
-    detection = decide(std::move(candidates), model_, options_, compare, one_of_several_);
+    detection = decided();
   }
   if (accept_anyway && !detection.candidates.empty() && detection.status != Status::accepted) {
     detection.explanation = fmt::format("accepted because the user vouches for it, although {}", detection.explanation);

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <numbers>
 #include <set>
+#include <vector>
 
 #include "support/matchers.h"
 #include "unit/verify/seen.h"
@@ -145,6 +147,55 @@ TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
     candidate->weakest_direction = 0.0, candidate->explained_measurements = 1000.0, candidate->slip_lead = 500.0;
   }
   EXPECT_EQ(decide({best, rival}, block(), {}, undecided).reason, Reason::ambiguous_pose);
+}
+
+// Loose poses of one place, displaced along x by `offsets_mm`, each with a little less support than the one before it.
+std::vector<Candidate> held_by_edges(const std::vector<double>& offsets_mm) {
+  std::vector<Candidate> candidates;
+  for (const double offset_mm : offsets_mm) {
+    Candidate c = flawless({offset_mm, 0, 600});
+    c.weakest_direction = 0.0, c.explained_measurements = 1000.0, c.slip_lead = 500.0;
+    c.support -= 0.001 * static_cast<double>(candidates.size());
+    candidates.push_back(c);
+  }
+  return candidates;
+}
+
+double offset_mm(const Candidate& c) { return c.model_from_scan.inverse().translation().x(); }
+
+// Edges that speak by `rate` a millimetre for what is nearer to x = 0.
+Comparison nearer_wins(double rate) {
+  return [rate](const Candidate& a, const Candidate& b) {
+    return PoseContrast{rate * std::abs(offset_mm(b)), rate * std::abs(offset_mm(a))};
+  };
+}
+
+TEST(Verdict, OfLoosePosesThatCountAsOneTheEdgesChoose) {
+  const double step = 0.005 * block().diameter;
+  const std::vector<Candidate> candidates = held_by_edges({2.0 * step, 3.0 * step, 0.0, step});
+  EXPECT_NEAR(offset_mm(decide(candidates, block(), {}).best), 2.0 * step, 1e-9);  // the best by support
+  const auto kept = without_beaten_at_edges(candidates, block(), {}, nearer_wins(10.0 / step));
+  ASSERT_EQ(kept.size(), 2U);
+  EXPECT_NEAR(offset_mm(kept.front()), 0.0, 1e-9);
+  EXPECT_NEAR(offset_mm(decide(kept, block(), {}).best), 0.0, 1e-9);
+}
+
+TEST(Verdict, EdgesChooseOnlyAmongLoosePosesOfOnePlaceThatNothingSpeaksAgainst) {
+  const double step = 0.005 * block().diameter;
+  const auto left_of = [](const std::vector<Candidate>& candidates, double rate) {
+    return without_beaten_at_edges(candidates, block(), {}, nearer_wins(rate)).size();
+  };
+  std::vector<Candidate> candidates = held_by_edges({2.0 * step, 0.0});
+  EXPECT_EQ(left_of(candidates, 10.0 / step), 1U);
+  EXPECT_EQ(left_of(candidates, 0.5 / step), 2U) << "two measurements may be chance";
+  candidates = held_by_edges({40.0 * step, 0.0});
+  EXPECT_EQ(left_of(candidates, 10.0 / step), 2U) << "not the same pose: rivals";
+  candidates = held_by_edges({2.0 * step, 0.0});
+  candidates[0].weakest_direction = 0.05;
+  EXPECT_EQ(left_of(candidates, 10.0 / step), 2U) << "the surface holds the first";
+  candidates = held_by_edges({2.0 * step, 0.0});
+  candidates[1].score = 0.3;
+  EXPECT_EQ(left_of(candidates, 10.0 / step), 2U) << "the second is refused on its own";
 }
 
 TEST(Verdict, ALeadInSupportDecidesNothingWhereTheScanShowsNoDifference) {
