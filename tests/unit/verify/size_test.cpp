@@ -78,6 +78,12 @@ TEST(SizeLead, TellsABoxFromLargerAndSmallerOnesWhereItsEdgesAreSeen) {
   EXPECT_LT(Believed(kBrick, kBrick / 0.9, {}).lead(), 0.0);
 }
 
+// The corner that is seen lies right, and the far edges are but a twentieth off.
+TEST(SizeLead, TellsABoxFromOneALittleSmaller) {
+  EXPECT_LT(Believed(0.95 * kBrick, kBrick, {}).lead(), 0.0);
+  EXPECT_LT(Believed(1.05 * kBrick, kBrick, {}).lead(), 0.0);
+}
+
 // A screen before the box with a window in which its nearest corner is seen, but no other.
 TEST(SizeLead, IsNoneWhereTheFarEdgesAreHidden) {
   const std::vector<TriangleMesh> screen{
