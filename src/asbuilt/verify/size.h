@@ -14,8 +14,8 @@ namespace asbuilt::verify {
 
 /// By how many measurements the pose leads over copies of the part, one to three tenths smaller and one to four tenths
 /// larger, that lie on the same surface (see contrast()): whether its far edges were seen. Half of the lead over
-/// copies 6 % smaller or larger that keep a corner of the part's box count likewise. The least of them; negative if such
-/// a copy explains the scan better.
+/// copies 6 % smaller or larger that keep a corner of the part's box count likewise. The least of them; negative if
+/// such a copy explains the scan better.
 [[nodiscard]] double size_lead(const Pose& model_from_scan, const PoseEvidence& evidence,
                                const model::PreparedModel& model, const ScanEvidence& scan,
                                const EvidenceOptions& options);
