@@ -86,12 +86,11 @@ Result<void> judge_cases(const Arguments& arguments) {
     const auto shared = std::make_shared<const PreparedPart>(std::move(made));
     const auto judge_scan = [&, shared](CaseRecord& record, const CaseScan& scan) -> Result<void> {
       if (!arguments.write_scans.empty()) {  // as `asbuilt detect` reads it, to look at it or to judge it alone
-        const std::string name = fmt::format("{}_{}.ply", record.part, record.seed);
-        ASBUILT_CHECK(simulate::write_points(arguments.write_scans / name, scan.points_in_scan.positions));
+        const std::string stem = fmt::format("{}_{}", record.part, record.seed);
+        ASBUILT_CHECK(simulate::write_points(arguments.write_scans / (stem + ".ply"), scan.points_in_scan.positions));
         if (scan.model_from_scan) {
-          const std::vector<io::NamedPose> truth = {{name, *scan.model_from_scan}};
-          ASBUILT_CHECK(
-              io::write_poses_csv(arguments.write_scans / fmt::format("{}_{}.csv", record.part, record.seed), truth));
+          const std::vector<io::NamedPose> truth = {{stem + ".ply", *scan.model_from_scan}};
+          ASBUILT_CHECK(io::write_poses_csv(arguments.write_scans / (stem + ".csv"), truth));
         }
       }
       return judge(record, scan, part, *shared, options, context);

@@ -436,33 +436,33 @@ std::vector<Candidate> without_beaten_at_edges(std::vector<Candidate> candidates
   constexpr double kLeastLead = 2.0;  // measurements
   if (options.paper_mode) return candidates;
   std::ranges::stable_sort(candidates, std::ranges::greater{}, &Candidate::support);
-  std::vector<std::uint8_t> is_dropped(candidates.size(), 0);
-  const auto takes_part = [&](std::size_t i) {
-    return is_dropped[i] == 0 && !surface_holds(candidates[i], options) &&
-           objection(candidates[i], options).reason == Reason::none;
-  };
-  for (std::size_t first = 0; first < candidates.size(); ++first) {
-    if (!takes_part(first)) continue;
-    const auto counts_as_first = [&](std::size_t i) {
-      return displacement_modulo_mm(candidates[first].model_from_scan, candidates[i].model_from_scan, model) <=
-             kSamePose * model.diameter;
+  const std::size_t count = candidates.size();
+  std::vector<std::uint8_t> takes_part(count), is_beaten(count, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    takes_part[i] = !surface_holds(candidates[i], options) && objection(candidates[i], options).reason == Reason::none;
+  }
+  for (std::size_t first = 0; first < count; ++first) {
+    if (!takes_part[first] || is_beaten[first]) continue;
+    const auto is_rival = [&](std::size_t i) {
+      return takes_part[i] && !is_beaten[i] &&
+             displacement_modulo_mm(candidates[first].model_from_scan, candidates[i].model_from_scan, model) <=
+                 kSamePose * model.diameter;
     };
     std::size_t leader = first;
-    for (std::size_t i = first + 1; i < candidates.size(); ++i) {
-      if (!takes_part(i) || !counts_as_first(i)) continue;
+    for (std::size_t i = first + 1; i < count; ++i) {
+      if (!is_rival(i)) continue;
       const PoseContrast seen = compare(candidates[leader], candidates[i]);
       if (seen.for_second - seen.for_first > kLeastLead) leader = i;
     }
     for (std::size_t i = first; i < leader; ++i) {
-      if (takes_part(i) && counts_as_first(i)) is_dropped[i] = 1;
+      if (is_rival(i)) is_beaten[i] = 1;
     }
   }
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (is_dropped[i] == 0) candidates[kept++] = candidates[i];
+  std::vector<Candidate> kept;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!is_beaten[i]) kept.push_back(candidates[i]);
   }
-  candidates.resize(kept);
-  return candidates;
+  return kept;
 }
 
 Detection decide(std::vector<Candidate> candidates, const model::PreparedModel& model, const VerifyOptions& options,
