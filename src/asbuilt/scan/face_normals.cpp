@@ -15,73 +15,106 @@ namespace {
 constexpr int kRefits = 3;
 constexpr double kLimitInSigmas = 4.0;     // neighbours further off a plane are of another face
 constexpr float kOneFace = 0.8F;           // share of the neighbours that the given plane keeps far from any edge
-constexpr std::size_t kSpanning = 8;       // neighbours that span proposals, evenly among all
+constexpr Eigen::Index kSpanning = 8;      // neighbours that span proposals, evenly among all
 constexpr float kSameSide = 0.3F;          // cosine: a proposal looks roughly where the given normal does
 constexpr float kLargestRefitTurn = 0.7F;  // cosine: a refit that turns further has changed the face
 
-// Neighbours of one point relative to it, nearest first; the point itself left out.
-struct Neighbourhood {
-  std::vector<Eigen::Vector3f> offsets;
-  std::vector<Eigen::Vector3f> normals;
+// Neighbours of one point relative to it, nearest first; the point itself left out. Axis by axis, so that sums over
+// them are vector instructions: hundreds of planes compete at every point near an edge.
+class Neighbourhood {
+  // Tukey's weights of the heights above a plane, so that it is judged by what it keeps and not by what it misses.
+  [[nodiscard]] auto weights(const Eigen::Vector3f& normal, float limit) const {
+    const Eigen::Index n = count();
+    const Eigen::Vector3f scaled = normal / limit;
+    const auto heights = x_.head(n) * scaled.x() + y_.head(n) * scaled.y() + z_.head(n) * scaled.z();
+    return (1.0F - heights.square()).max(0.0F).square();
+  }
+
+ public:
+  explicit Neighbourhood(std::size_t most)
+      : x_(static_cast<Eigen::Index>(most)), y_(x_.size()), z_(x_.size()), weights_(x_.size()) {
+    normals_.reserve(most);
+  }
+
+  void clear() { normals_.clear(); }
+
+  void add(const Eigen::Vector3f& offset, const Eigen::Vector3f& normal) {
+    x_[count()] = offset.x();
+    y_[count()] = offset.y();
+    z_[count()] = offset.z();
+    normals_.push_back(normal);
+  }
+
+  [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(normals_.size()); }
+  [[nodiscard]] const std::vector<Eigen::Vector3f>& normals() const { return normals_; }
+  [[nodiscard]] Eigen::Vector3f offset(Eigen::Index i) const { return {x_[i], y_[i], z_[i]}; }
+
+  // Of the neighbours that a plane through the point keeps: the sum of their weights.
+  [[nodiscard]] float kept(const Eigen::Vector3f& normal, float limit) const { return weights(normal, limit).sum(); }
+
+  struct Moments {
+    double weight = 0.0;
+    Eigen::Vector3d sum;
+    Eigen::Matrix3d squares;
+  };
+  [[nodiscard]] Moments moments(const Eigen::Vector3f& normal, float limit) {
+    const Eigen::Index n = count();
+    auto w = weights_.head(n);
+    const auto x = x_.head(n), y = y_.head(n), z = z_.head(n);
+    w = weights(normal, limit);
+    Moments result;
+    result.weight = static_cast<double>(w.sum());
+    result.sum = Eigen::Vector3f((w * x).sum(), (w * y).sum(), (w * z).sum()).cast<double>();
+    Eigen::Matrix3f squares;
+    squares << (w * x * x).sum(), (w * x * y).sum(), (w * x * z).sum(), 0.0F, (w * y * y).sum(), (w * y * z).sum(),
+        0.0F, 0.0F, (w * z * z).sum();
+    result.squares = squares.cast<double>().selfadjointView<Eigen::Upper>();
+    return result;
+  }
+
+ private:
+  Eigen::ArrayXf x_, y_, z_;
+  Eigen::ArrayXf weights_;  // scratch
+  std::vector<Eigen::Vector3f> normals_;
 };
-
-// Tukey's weight of a height, so that a plane is judged by what it keeps and not by what it misses.
-float kept_weight(float height_in_limits) {
-  const float left = std::max(0.0F, 1.0F - height_in_limits * height_in_limits);
-  return left * left;
-}
-
-float kept(const Neighbourhood& around, const Eigen::Vector3f& normal, float limit) {
-  float sum = 0.0F;
-  for (const Eigen::Vector3f& offset : around.offsets) sum += kept_weight(normal.dot(offset) / limit);
-  return sum;
-}
 
 // The plane through the point that keeps most, the first of equals.
 Eigen::Vector3f best_proposal(const Neighbourhood& around, const Eigen::Vector3f& given, float limit) {
   Eigen::Vector3f best = given;
-  float most = kept(around, given, limit);
-  const std::size_t count = around.offsets.size();
+  float most = around.kept(given, limit);
+  const Eigen::Index count = around.count();
   if (most >= kOneFace * static_cast<float>(count)) return best;
   const auto propose = [&](const Eigen::Vector3f& normal) {
     if (normal.dot(given) < kSameSide) return;
-    const float support = kept(around, normal, limit);
+    const float support = around.kept(normal, limit);
     if (support > most) {
       most = support;
       best = normal;
     }
   };
-  for (const Eigen::Vector3f& normal : around.normals) propose(normal);
-  const std::size_t step = std::max<std::size_t>(1, count / kSpanning);
-  for (std::size_t i = step - 1; i < count; i += step) {
-    for (std::size_t j = i + step; j < count; j += step) {
-      const Eigen::Vector3f across = around.offsets[i].cross(around.offsets[j]);
+  for (const Eigen::Vector3f& normal : around.normals()) propose(normal);
+  const Eigen::Index step = std::max<Eigen::Index>(1, count / kSpanning);
+  for (Eigen::Index i = step - 1; i < count; i += step) {
+    const Eigen::Vector3f first = around.offset(i);
+    for (Eigen::Index j = i + step; j < count; j += step) {
+      const Eigen::Vector3f second = around.offset(j), across = first.cross(second);
       const float length = across.norm();
       // Neighbours nearly in one line with the point span nothing.
-      if (!(length > 0.5F * around.offsets[i].norm() * around.offsets[j].norm())) continue;
+      if (!(length > 0.5F * first.norm() * second.norm())) continue;
       propose((across.dot(given) < 0.0F ? -1.0F : 1.0F) / length * across);
     }
   }
   return best;
 }
 
-Eigen::Vector3f refitted(const Neighbourhood& around, const Eigen::Vector3f& start, float limit) {
+Eigen::Vector3f refitted(Neighbourhood& around, const Eigen::Vector3f& start, float limit) {
   Eigen::Vector3f normal = start;
   for (int pass = 0; pass < kRefits; ++pass) {
-    double weights = 1.0;  // the point itself
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
-    for (const Eigen::Vector3f& offset : around.offsets) {
-      const auto weight = static_cast<double>(kept_weight(normal.dot(offset) / limit));
-      if (weight <= 0.0) continue;
-      const Eigen::Vector3d x = offset.cast<double>();
-      weights += weight;
-      sum += weight * x;
-      moments += weight * x * x.transpose();
-    }
-    moments = moments / weights - (sum / weights) * (sum / weights).transpose();
+    const Neighbourhood::Moments moments = around.moments(normal, limit);
+    const double weight = 1.0 + moments.weight;  // the point itself
+    const Eigen::Vector3d mean = moments.sum / weight;
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-    eigen.computeDirect(moments);
+    eigen.computeDirect(moments.squares / weight - mean * mean.transpose());
     Eigen::Vector3f fitted = eigen.eigenvectors().col(0).cast<float>();
     if (!fitted.allFinite() || !(eigen.eigenvalues()[1] > 0.0)) return normal;
     if (fitted.dot(start) < 0.0F) fitted = -fitted;
@@ -104,18 +137,16 @@ std::vector<Eigen::Vector3f> face_normals_at(std::span<const std::uint32_t> at, 
   const auto limit = static_cast<float>(kLimitInSigmas * noise);
   parallel_for_blocks(context, at.size(), 256, [&](std::size_t begin, std::size_t end) {
     std::vector<KdTree::Neighbour> neighbours;
-    Neighbourhood around;
+    Neighbourhood around(count);
     for (std::size_t i = begin; i < end; ++i) {
       const Eigen::Vector3f& centre = cloud.positions[at[i]];
       tree.nearest(centre, count, neighbours);
-      around.offsets.clear();
-      around.normals.clear();
+      around.clear();
       for (const KdTree::Neighbour& neighbour : neighbours) {
         if (neighbour.index == at[i]) continue;
-        around.offsets.push_back(cloud.positions[neighbour.index] - centre);
-        around.normals.push_back(cloud.normals[neighbour.index]);
+        around.add(cloud.positions[neighbour.index] - centre, cloud.normals[neighbour.index]);
       }
-      if (around.offsets.size() < 3) continue;
+      if (around.count() < 3) continue;
       normals[i] = refitted(around, best_proposal(around, normals[i], limit), limit);
     }
   });
