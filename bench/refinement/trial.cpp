@@ -91,6 +91,7 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
       view.model_from_scan = near;
     }
   }
+  refine::sample_views(views, options, context);
   const std::vector<refine::View> start = views;
   constexpr int kMostRounds = 3;
   for (int round = 1;; ++round) {

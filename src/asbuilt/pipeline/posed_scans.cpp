@@ -72,6 +72,7 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
     views.push_back({scan.part, scan.model_from_local_start, scan.noise_sigma_mm, scan.viewpoint});
     if (scan.taken_from.empty()) views.back().beside_occluder = scan.beside_occluder;
     views.back().spacing_mm = scan.spacing_mm;
+    views.back().sample = scan.sample;
   }
   return views;
 }
@@ -138,7 +139,9 @@ Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedM
 Result<RefinedComponent> refine_component(const std::vector<int>& members, const graph::PoseGraph& graph,
                                           std::vector<PosedScan>& scans, const LoadedModel& model,
                                           const Options& options, const Context& context) {
-  const std::vector<refine::View> views = views_of(members, scans);
+  std::vector<refine::View> views = views_of(members, scans);
+  if (views.size() > 1) refine::sample_views(views, options.refine, context);
+  for (std::size_t i = 0; i < members.size(); ++i) scans[static_cast<std::size_t>(members[i])].sample = views[i].sample;
   RefinedComponent component{members, links_among(members, graph), {}, Pose::Identity()};
   ASBUILT_TRY(refinement, refined(views, component.links, model, options, context));
   component.refinement = std::move(refinement);
@@ -179,6 +182,7 @@ Result<void> remove_seen_through(const RefinedComponent& component, std::vector<
     scan.part = std::move(kept);
     scan.taken_out = std::move(taken);
     scan.taken_from = std::move(from);
+    scan.sample.reset();
   }
   return {};
 }
@@ -198,6 +202,7 @@ void restore_seen_through(std::vector<PosedScan>& scans) {
     scan.part = std::move(whole);
     scan.taken_out = {};
     scan.taken_from.clear();
+    scan.sample.reset();
   }
 }
 

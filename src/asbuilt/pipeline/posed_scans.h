@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,7 @@ struct PosedScan {
   std::vector<std::uint8_t> beside_occluder;          ///< of each point of `part` as read; empty: not known
   PointCloud taken_out;                               ///< by remove_seen_through
   std::vector<std::uint32_t> taken_from;              ///< where these stood in `part` as read, ascending
+  std::shared_ptr<const refine::SampledView> sample;  ///< of `part` as it is now, for the next refinement; or none
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is

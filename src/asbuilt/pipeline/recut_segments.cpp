@@ -70,6 +70,7 @@ Result<std::vector<fuse::PosedSegment>> recut_segments(const RefinedComponent& c
   for (const int member : component.members) {
     PosedScan& scan = scans[static_cast<std::size_t>(member)];
     scan.part = scan.taken_out = {};
+    scan.sample.reset();
     ASBUILT_TRY(segment, segment_of(scan, record, folder));
     seen.push_back(
         {std::move(segment.cloud), segment.is_part, scan.model_from_local, scan.noise_sigma_mm, scan.viewpoint});

@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -93,6 +94,14 @@ int view_with_most_points(std::span<const View> views) {
   return static_cast<int>(most - views.begin());
 }
 
+SamplingRules sampling_rules(const RefineOptions& options) {
+  return {static_cast<std::size_t>(options.points_per_scan), kCoarsePoints, options.face_normals, options.rim_weights};
+}
+
+bool has_sample(const View& view, const SamplingRules& rules) {
+  return view.sample && view.sample->rules == rules && view.sample->noise_sigma_mm == view.noise_sigma_mm;
+}
+
 // A covariance (its eigenvectors, and variances, ascending) that is nowhere less than `least`, by its first `held`
 // directions; the others stay.
 Matrix6d widened(const Matrix6d& motions, const Vector6d& variances, Eigen::Index held, const Matrix6d& least) {
@@ -141,12 +150,13 @@ class JointRefinement {
   };
 
   void sample(std::span<const View> views) {
-    const SamplingRules rules{static_cast<std::size_t>(options_.points_per_scan), kCoarsePoints, options_.face_normals,
-                              options_.rim_weights, options_.rim_matches};
+    const SamplingRules rules = sampling_rules(options_);
     views_.resize(views.size());
     parallel_for(context_, views.size(), 1, [&](std::size_t v) {
-      views_[v] =
-          sampled_view(views[v].segment_in_scan, views[v].noise_sigma_mm, rules, context_, views[v].beside_occluder);
+      const View& view = views[v];
+      views_[v] = has_sample(view, rules) ? *view.sample
+                                          : sampled_view(view.segment_in_scan, view.noise_sigma_mm, rules, context_);
+      if (options_.rim_matches) find_rims(views_[v], view.segment_in_scan, view.beside_occluder, context_);
     });
   }
 
@@ -242,11 +252,16 @@ class JointRefinement {
             0.0};
   }
 
-  // Gives the number of edges whose matches are new.
-  std::size_t match_and_scale(bool coarse, bool first, bool afresh) {
+  // Edges keep the matches that they have where hardly one of them would change, unless all shall be searched `afresh`.
+  [[nodiscard]] MatchRules matching_rules(bool coarse, bool afresh) const {
     MatchRules matching = rules(coarse);
     if (options_.keep_matches && !afresh) matching.keep_spacings = kKeepSpacings;
-    const std::size_t searched = find_matches(edges_, views_, poses_, matching, context_);
+    return matching;
+  }
+
+  // Gives the number of edges whose matches are new.
+  std::size_t match_and_scale(bool coarse, bool first, bool afresh) {
+    const std::size_t searched = find_matches(edges_, views_, poses_, matching_rules(coarse, afresh), context_);
     if (!options_.anneal && !first) return searched;  // the published loss has one fixed scale
     std::vector<ResidualStatistics> statistics(edges_.size());
     parallel_for(context_, edges_.size(), 1,
@@ -316,9 +331,7 @@ class JointRefinement {
       rim_edges_[e].scale_mm = std::max(edges_[e].scale_mm, to_go(edges_[e]));
       rim_edges_[e].weight = edges_[e].weight;
     }
-    MatchRules matching = rules(coarse);
-    if (options_.keep_matches && !afresh) matching.keep_spacings = kKeepSpacings;
-    find_rim_matches(rim_edges_, views_, poses_, matching, context_);
+    find_rim_matches(rim_edges_, views_, poses_, matching_rules(coarse, afresh), context_);
   }
 
   [[nodiscard]] std::vector<EdgeSums> linearised(std::span<const DirectedEdge> edges) const {
@@ -526,8 +539,8 @@ class JointRefinement {
 
   // Everything that is said about the final poses.
   Result<void> conclude(Refinement& result) {
-    find_matches(edges_, views_, poses_, rules(false), context_);
-    match_rims(false, true);
+    find_matches(edges_, views_, poses_, matching_rules(false, false), context_);
+    match_rims(false, false);
     const std::vector<EdgeSums> sums = linearised(edges_), rim_sums = linearised(rim_edges_);
     if (context_.cancelled()) return fail(ErrorCode::cancelled, "cancelled during the joint refinement");
     result.rms_after_mm = pooled_rms(sums);
@@ -743,6 +756,16 @@ RefineOptions RefineOptions::as_published() const {
   published.edge_weights = published.anneal = published.coarse_to_fine = published.keep_matches = false;
   published.drop_unheld = published.loose_on_model = published.symmetric = false;
   return published;
+}
+
+void sample_views(std::span<View> views, const RefineOptions& options, const Context& context) {
+  const SamplingRules rules = sampling_rules(options.paper_mode ? options.as_published() : options);
+  parallel_for(context, views.size(), 1, [&](std::size_t v) {
+    View& view = views[v];
+    if (has_sample(view, rules) || !check_view(view, v)) return;
+    view.sample =
+        std::make_shared<const SampledView>(sampled_view(view.segment_in_scan, view.noise_sigma_mm, rules, context));
+  });
 }
 
 Result<Refinement> refine(std::span<const View> views, std::span<const Link> links, const RefineOptions& chosen,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -14,14 +15,17 @@
 
 namespace asbuilt::refine {
 
+struct SampledView;
+
 /// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
 struct View {
   PointCloud segment_in_scan;
   Pose model_from_scan = Pose::Identity();
-  double noise_sigma_mm = 0.0;  ///< 0: unknown
-  scan::Viewpoint viewpoint{};  ///< in the scan frame, if known
+  double noise_sigma_mm = 0.0;                  ///< 0: unknown
+  scan::Viewpoint viewpoint{};                  ///< in the scan frame, if known
   std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
   double spacing_mm = 0.0;  ///< of the scan's points; 0: unknown. Two scans agree no better than a tenth of it
+  std::shared_ptr<const SampledView> sample{};  ///< of this very segment (sample_views); none: made when it is needed
 };
 
 /// Where one scan's own points fit the CAD best, and how well they hold it there.
@@ -30,7 +34,8 @@ struct ModelFit {
   /// Inverse covariance of the twist (rotation rad, translation mm) applied on the left, for a part that deviates from
   /// its CAD as the scan shows; zero along what the surface in sight does not hold.
   Matrix6d information = Matrix6d::Zero();
-  double share_off = 0.0;  ///< of its points: further off the CAD than parts deviate from theirs, or facing away from it
+  double share_off =
+      0.0;  ///< of its points: further off the CAD than parts deviate from theirs, or facing away from it
 };
 
 /// Undirected link; both directions enter Eq. 5.
@@ -118,10 +123,15 @@ struct Refinement {
   /// Faces that links hold well are enough to know every view to within the noise. If not, what noise and curvature
   /// feign has a share in the poses.
   bool firmly_held = true;
-  bool on_model = false;              ///< the CAD had a say
-  std::vector<LinkHold> link_holds;   ///< one a link, in the order of the links
-  std::vector<ViewHold> view_holds;   ///< one a view; empty without links
+  bool on_model = false;             ///< the CAD had a say
+  std::vector<LinkHold> link_holds;  ///< one a link, in the order of the links
+  std::vector<ViewHold> view_holds;  ///< one a view; empty without links
 };
+
+/// Samples the views that have no sample yet, or one of other rules. Refinements of the same segments that follow need
+/// not do it again, which is most of what a refinement from near by takes. Whoever changes a segment drops its sample.
+/// Views that refine() would refuse are left alone.
+void sample_views(std::span<View> views, const RefineOptions& options, const Context& context);
 
 /// Minimises Eq. 5 over all poses of one component at once; without `on_model` the CAD does not enter.
 ///

@@ -176,12 +176,13 @@ std::vector<Place> places_of(const PointCloud& cloud, const KdTree& tree, double
 }
 
 SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const SamplingRules& rules,
-                         const Context& context, std::span<const std::uint8_t> beside_occluder) {
+                         const Context& context) {
   SampledView view;
+  view.rules = rules;
   view.points = evenly_sampled(segment, rules.points, context);
   view.coarse = even_indices(view.points.positions, rules.coarse_points, context);
   view.noise_sigma_mm = noise_sigma_mm;
-  view.tree = std::make_unique<const KdTree>(view.points.positions);
+  view.tree = std::make_shared<const KdTree>(view.points.positions);
   view.spacing_mm = median_spacing(view.points.positions, *view.tree);
   const auto fitted = static_cast<double>(scan::neighbours_for_normals(noise_sigma_mm, view.spacing_mm));
   view.fit_radius_mm = std::sqrt(fitted / std::numbers::pi) * view.spacing_mm;
@@ -189,14 +190,9 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
     view.points.normals = scan::face_normals(view.points, *view.tree, noise_sigma_mm, view.spacing_mm, context);
   }
   view.weight.assign(view.points.size(), 1.0F);
-  if ((rules.rim_weights || rules.rim_matches) && view.spacing_mm > 0.0) {
+  if (rules.rim_weights && view.spacing_mm > 0.0) {
     const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
-    if (rules.rim_weights) weigh_rims(view, places, median_spacing(segment.positions), context);
-    if (rules.rim_matches && beside_occluder.size() == segment.size()) {
-      const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder, context);
-      view.on_flat_face = on_flat_faces(view, context);
-      view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, noise_sigma_mm, context);
-    }
+    weigh_rims(view, places, median_spacing(segment.positions), context);
   }
   for (const Eigen::Vector3f& point : view.points.positions) view.centroid += point.cast<double>();
   const auto count = static_cast<double>(view.points.size());
@@ -207,6 +203,15 @@ SampledView sampled_view(const PointCloud& segment, double noise_sigma_mm, const
   }
   view.radius_mm = std::sqrt(squared / count);
   return view;
+}
+
+void find_rims(SampledView& view, const PointCloud& segment, std::span<const std::uint8_t> beside_occluder,
+               const Context& context) {
+  if (beside_occluder.size() != segment.size() || !(view.spacing_mm > 0.0)) return;
+  const std::vector<Place> places = places_of(view.points, *view.tree, view.spacing_mm, context);
+  const std::vector<std::uint32_t> rim = open_rim(view, places, segment, beside_occluder, context);
+  view.on_flat_face = on_flat_faces(view, context);
+  view.rims = rim_points(view.points, *view.tree, rim, view.spacing_mm, view.noise_sigma_mm, context);
 }
 
 }  // namespace asbuilt::refine

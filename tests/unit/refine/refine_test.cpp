@@ -261,6 +261,37 @@ TEST(Refine, KeepingMatchesEndsWhereSearchingAlwaysEnds) {
   EXPECT_LT(largest, 0.02);  // a fifth of the noise of one point (0.1 mm); either stops at motions of 0.002 mm
 }
 
+TEST(Refine, SamplesMadeBeforehandChangeNothing) {
+  test::Scene scene = test::bumpy_scene({}, 6);
+  const Refinement without = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  const auto expect_the_same = [&] {
+    const Refinement with = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+    for (std::size_t v = 0; v < scene.views.size(); ++v) {
+      EXPECT_EQ(with.model_from_scan[v].matrix(), without.model_from_scan[v].matrix());
+      EXPECT_EQ(with.covariance[v], without.covariance[v]);
+    }
+  };
+  RefineOptions few;
+  few.points_per_scan = 500;
+  sample_views(scene.views, few, Context(2));
+  for (const View& view : scene.views) ASSERT_TRUE(view.sample);
+  expect_the_same();  // those of other rules are passed over
+  sample_views(scene.views, {}, Context(2));
+  expect_the_same();
+  const auto kept = scene.views[0].sample;
+  sample_views(scene.views, {}, Context(2));
+  EXPECT_EQ(scene.views[0].sample, kept) << "it was made twice";
+}
+
+TEST(Refine, ViewsThatAreRefusedAreNotSampled) {
+  std::vector<View> views(3);
+  views[1].segment_in_scan.positions.emplace_back(0.0F, 0.0F, 0.0F);  // no normal
+  views[2].segment_in_scan.positions.emplace_back(std::nanf(""), 0.0F, 0.0F);
+  views[2].segment_in_scan.normals.push_back(Eigen::Vector3f::UnitZ());
+  sample_views(views, {}, Context(1));
+  for (const View& view : views) EXPECT_FALSE(view.sample);
+}
+
 TEST(Refine, StopsWhenAskedTo) {
   const test::Scene scene = test::bumpy_scene({}, 1);
   std::stop_source stop;
