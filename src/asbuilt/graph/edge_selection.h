@@ -20,7 +20,7 @@ struct PairOverlap {
 struct EdgeSelectionOptions {
   double low = 0.05;         ///< alpha_l: a pair below it is never linked (our value; the paper gives none)
   double high = 0.10;        ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
-  int max_degree = 0;        ///< strong links a scan keeps in dense networks, firmest first; 0: all of them
+  int max_degree = 12;       ///< strong links a scan keeps in dense networks, firmest first; 0: all (docs/graph.md)
   bool bridges_only = true;  ///< below `high` only a pair that joins two components; paper: any, until connected
 
   [[nodiscard]] Result<void> validate() const;  ///< 0 <= low <= high <= 1, max_degree >= 0

@@ -78,6 +78,20 @@ TEST(EdgeSelection, UnderTheCapTwoCrowdsAreTiedByMoreThanOneLink) {
   EXPECT_GE(across, 2);
 }
 
+TEST(EdgeSelection, ByDefaultLinksGrowWithTheScansAndNotWithTheirPairs) {
+  const auto links_of = [](int scans) {
+    std::vector<PairOverlap> overlaps;
+    for (int a = 0; a < scans; ++a) {
+      for (int b = a + 1; b < scans; ++b) overlaps.push_back({a, b, 0.5, 1.0 / (1.0 + b - a)});
+    }
+    const EdgeSelection selection = select_edges(scans, overlaps).value();
+    EXPECT_THAT(selection.components, testing::SizeIs(1));
+    return selection.edges.size();
+  };
+  EXPECT_EQ(links_of(13), 13U * 12U / 2U) << "so few lose none";
+  EXPECT_LE(links_of(200), 200U * 12U / 2U + 199U) << "the cap, and the forest that takes no notice of it";
+}
+
 TEST(EdgeSelection, NothingGivesNothing) {
   const EdgeSelection selection = select_edges(0, {}).value();
   EXPECT_THAT(selection.edges, IsEmpty());
