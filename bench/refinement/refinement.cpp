@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // asbuilt_refinement: what bench/refinement/run calls. Each subcommand appends its trials, one JSON object a line.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -19,8 +21,10 @@ namespace {
 
 struct Arguments {
   std::filesystem::path out, cad;
+  std::string part = "valve_body";  // of `scale`
   std::vector<std::string> folders, settings;
   std::vector<int> scans{8, 128}, own;
+  std::vector<int> degrees{8, graph::PoseGraphOptions{}.edges.max_degree, 0};
   double angle = 0.0, shift = 0.0;
   int seeds = 10, count = 40, first = 0, scenes = 20, points = 60000, threads = 0;
 };
@@ -91,7 +95,15 @@ Result<void> run_wrong(const Arguments& args) {
 }
 
 Result<void> run_scale(const Arguments& args) {
-  ASBUILT_TRY(trials, scale_trials(args.scans, Context(args.threads)));
+  ASBUILT_TRY(parts, scene_parts(args));
+  const auto part = std::ranges::find(parts, args.part, &ScenePart::name);
+  if (part == parts.end()) {
+    std::vector<std::string> names;
+    for (const ScenePart& known : parts) names.push_back(known.name);
+    return fail(ErrorCode::invalid_argument,
+                fmt::format("--part {}: expected one of {}", args.part, fmt::join(names, ", ")));
+  }
+  ASBUILT_TRY(trials, scale_trials(*part, args.scans, args.degrees, Context(args.threads)));
   return append(args, trials);
 }
 
@@ -187,11 +199,15 @@ int run(int argc, char** argv) {
   wrong->add_option("--count", args.count, "trials a set");
   own->add_option("--scenes", args.scenes);
   own->add_option("--first", args.first, "first scene");
-  for (CLI::App* command : {own, wrong, one}) {
+  for (CLI::App* command : {own, wrong, one, scale}) {
     command->add_option("--cad", args.cad, "scenes of the parts of this folder");
+  }
+  for (CLI::App* command : {own, wrong, one}) {
     command->add_option("--points", args.points, "of a scan of our own simulator");
   }
   scale->add_option("--scans", args.scans);
+  scale->add_option("--part", args.part, "one of our own, or of --cad")->capture_default_str();
+  scale->add_option("--degrees", args.degrees, "links that a scan may have; 0: all");
   one->add_option("--set", args.settings, "NAME=NUMBER");
   one->add_option("--angle", args.angle);
   one->add_option("--shift", args.shift);

@@ -47,6 +47,13 @@ std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::
   return links;
 }
 
+std::vector<std::pair<int, int>> linked_pairs(const graph::PoseGraph& graph) {
+  std::vector<std::pair<int, int>> pairs;
+  for (const graph::PairOverlap& edge : graph.edges) pairs.emplace_back(edge.first, edge.second);
+  std::ranges::sort(pairs);
+  return pairs;
+}
+
 Trial trial_of(const char* kind, const RefinementScene& scene, std::string variant, std::uint64_t seed,
                const JointRun& run) {
   Trial trial{kind, scene.name, std::move(variant), seed, {}, {}};
@@ -93,12 +100,21 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
   }
   refine::sample_views(views, options, context);
   const std::vector<refine::View> start = views;
+  const auto timed = [&] {
+    run.seconds = watch.seconds();
+    run.cpu_seconds = watch.cpu_seconds();
+    return run;
+  };
+  std::vector<std::pair<int, int>> pairs_before;
   constexpr int kMostRounds = 3;
   for (int round = 1;; ++round) {
     const std::vector<refine::View> remaining = chosen(views, left);
     std::vector<graph::PosedSegment> segments;
     for (const refine::View& view : remaining) segments.push_back({view.segment_in_scan, view.model_from_scan});
     ASBUILT_TRY(graph, graph::build_graph(segments, scene.prepared, graph_options, context));
+    std::vector<std::pair<int, int>> pairs = linked_pairs(graph);
+    if (round > 2 && pairs == pairs_before) return timed();  // nothing that the last round did not have
+    pairs_before = std::move(pairs);
     const std::vector<int>& members = graph.components.front();
     const std::vector<refine::View> together = chosen(remaining, members);
     const std::vector<refine::Link> links = links_among(graph, members);
@@ -120,12 +136,9 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
       run.poses[static_cast<std::size_t>(view)] = refinement.model_from_scan[i];
       views[static_cast<std::size_t>(view)].model_from_scan = refinement.model_from_scan[i];
     }
-    const bool settled = run.links == links.size() && round > 1;
     run.links = links.size();
     run.refinement = refinement;
-    run.seconds = watch.seconds();
-    run.cpu_seconds = watch.cpu_seconds();
-    if (settled || round == kMostRounds || options.paper_mode) return run;
+    if (round == kMostRounds || options.paper_mode) return timed();
   }
 }
 
@@ -266,7 +279,8 @@ Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, 
   return simulated_scene(fmt::format("{}_{:02}", part.name, number), part.mesh, options, context);
 }
 
-Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Context& context) {
+Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans, std::span<const int> degrees,
+                                        const Context& context) {
   std::vector<Trial> trials;
   const int most = *std::ranges::max_element(scans);
   simulate::SimulateOptions options;
@@ -274,7 +288,7 @@ Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Contex
   options.points = 12000;
   options.clutter_objects = 0;
   options.pose = "any";
-  ASBUILT_TRY(all, simulated_scene("valve_body", simulate::valve_body(), options, context));
+  ASBUILT_TRY(all, simulated_scene(part.name, part.mesh, options, context));
   const auto add = [&](int count, int max_degree) -> Result<void> {
     RefinementScene scene;
     scene.name = all.name;
@@ -289,20 +303,20 @@ Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Contex
     graph::PoseGraphOptions graph_options;
     graph_options.edges.max_degree = max_degree;
     ASBUILT_TRY(run, joint_run(scene, perturbed(scene, 1.0, 0.01, 0), {}, context, graph_options));
-    const std::string variant =
-        max_degree > 0 ? fmt::format("{} scans", count) : fmt::format("{} scans, all links", count);
+    const std::string variant = max_degree == 0 ? fmt::format("{} scans, all links", count)
+                                                : fmt::format("{} scans, {} links each", count, max_degree);
     Trial trial = trial_of("scale", scene, variant, 0, run);
     trial.figures["error_sigma"] = AccuracyJudge(scene).relative_pose_error(run.poses, run.members);
     trials.push_back(std::move(trial));
     return {};
   };
   constexpr int kMostWithoutCap = 128;
-  constexpr int kCap = 8;
   for (const int count : scans) {
-    ASBUILT_CHECK(add(count, kCap));
-    if (count <= kMostWithoutCap) ASBUILT_CHECK(add(count, 0));
+    for (const int degree : degrees) {
+      if (degree > 0 || count <= kMostWithoutCap) ASBUILT_CHECK(add(count, degree));
+    }
   }
-  ASBUILT_CHECK(add(*std::ranges::min_element(scans), kCap));
+  if (scans.size() > 1) ASBUILT_CHECK(add(*std::ranges::min_element(scans), degrees.front()));
   return trials;
 }
 

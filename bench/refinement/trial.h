@@ -65,8 +65,10 @@ struct ScenePart {
 [[nodiscard]] Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points,
                                                 const Context& context);
 
-/// Many scans of one part, from 1 degree and 1 % off: time against the number of scans, with the links of a scan capped
-/// at 8 and, up to 128 scans, not capped. The smallest number runs first and last.
-[[nodiscard]] Result<std::vector<Trial>> scale_trials(std::span<const int> scans, const Context& context);
+/// Many scans of `part`, from 1 degree and 1 % off: time and error against the number of scans, for each number of
+/// links that a scan may have (0: all, up to 128 scans). Of several numbers of scans the smallest runs first and last.
+/// Neither list may be empty.
+[[nodiscard]] Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans,
+                                                      std::span<const int> degrees, const Context& context);
 
 }  // namespace asbuilt::bench
