@@ -524,15 +524,15 @@ class JointRefinement {
       if (outcome == Outcome::settled) damping_ = 1e-6;
       const bool quiet =
           outcome == Outcome::settled || motion < (coarse ? kCoarseMotion : options_.converged_motion) * usual_scale_;
-      afresh = settled && quiet && !coarse && searched < edges_.size();
-      if (!settled || !quiet || afresh) continue;  // kept matches have the last word only if new ones agree
-      if (!coarse) {
-        afresh = weigh_rims_by_bias();
-        if (afresh) continue;
-        result.converged = true;
-        break;
-      }
-      coarse = false;
+      afresh = false;
+      if (!settled || !quiet) continue;
+      if (std::exchange(coarse, false)) continue;
+      // Kept matches have the last word only if new ones agree, and new ones see the weights that rims have by then.
+      const bool reweighed = weigh_rims_by_bias();
+      afresh = reweighed || searched < edges_.size();
+      if (afresh) continue;
+      result.converged = true;
+      break;
     }
     return {};
   }
