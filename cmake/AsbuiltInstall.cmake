@@ -3,7 +3,7 @@
 include(CMakePackageConfigHelpers)
 
 get_property(modules GLOBAL PROPERTY ASBUILT_MODULES)
-install(TARGETS ${modules} asbuilt_asbuilt EXPORT asbuiltTargets FILE_SET HEADERS)
+install(TARGETS ${modules} asbuilt_asbuilt EXPORT asbuiltTargets FILE_SET HEADERS FILE_SET other_headers)
 install(EXPORT asbuiltTargets NAMESPACE asbuilt:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/asbuilt)
 install(TARGETS asbuilt_cli RUNTIME)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/asbuiltConfig.cmake.in ${PROJECT_BINARY_DIR}/asbuiltConfig.cmake

@@ -14,7 +14,7 @@
 namespace asbuilt::verify {
 namespace {
 
-struct Part {
+struct Sought {
   Context context{2};
   model::PreparedModel model = test::prepared(test::casing());
   std::shared_ptr<const detect::Codebook> book = detect::build_codebook(model, {}, context).value();
@@ -27,9 +27,9 @@ struct Part {
   }
 };
 
-const Part& part() {
-  static const Part the_part;
-  return the_part;
+const Sought& sought() {
+  static const Sought the_sought;
+  return the_sought;
 }
 
 simulate::SimulateOptions small_scenes() {
@@ -45,18 +45,18 @@ simulate::SimulateOptions small_scenes() {
 }
 
 std::vector<simulate::SimulatedScan> scans_of(const simulate::SimulateOptions& options) {
-  return simulate::simulate(test::casing(), options, part().context).value().scans;
+  return simulate::simulate(test::casing(), options, sought().context).value().scans;
 }
 
 scan::Scan prepared(const simulate::SimulatedScan& simulated, const scan::ViewpointRequest& request = {}) {
-  return scan::prepare_scan({simulated.points_in_scan, {}}, std::nullopt, request, {}, part().context).value();
+  return scan::prepare_scan({simulated.points_in_scan, {}}, std::nullopt, request, {}, sought().context).value();
 }
 
 TEST(SimulatedScenes, ShowThePartInItsPlace) {
   for (const auto& simulated : scans_of(small_scenes())) {
-    const Detection detection = part().found_in(prepared(simulated), part().context);
+    const Detection detection = sought().found_in(prepared(simulated), sought().context);
     EXPECT_EQ(detection.status, Status::accepted) << simulated.name << ": " << detection.explanation;
-    EXPECT_LT(part().error(detection, *simulated.model_from_scan), 0.02) << simulated.name;
+    EXPECT_LT(sought().error(detection, *simulated.model_from_scan), 0.02) << simulated.name;
   }
 }
 
@@ -64,9 +64,9 @@ TEST(SimulatedScenes, ShowThePartWithoutViewpointAndNormals) {
   for (const auto& simulated : scans_of(small_scenes())) {
     const scan::Scan scan = prepared(simulated, {false, {}});
     ASSERT_FALSE(scan.normals_oriented);
-    const Detection detection = part().found_in(scan, part().context);
+    const Detection detection = sought().found_in(scan, sought().context);
     EXPECT_EQ(detection.status, Status::accepted) << simulated.name << ": " << detection.explanation;
-    EXPECT_LT(part().error(detection, *simulated.model_from_scan), 0.02) << simulated.name;
+    EXPECT_LT(sought().error(detection, *simulated.model_from_scan), 0.02) << simulated.name;
   }
 }
 
@@ -75,7 +75,7 @@ TEST(SimulatedScenes, WithoutThePartAreRejectedWithoutViewpointToo) {
   options.absent_share = 1.0;
   options.decoys = 1;
   for (const auto& simulated : scans_of(options)) {
-    const Detection detection = part().found_in(prepared(simulated, {false, {}}), part().context);
+    const Detection detection = sought().found_in(prepared(simulated, {false, {}}), sought().context);
     EXPECT_EQ(detection.status, Status::rejected) << simulated.name << ": " << detection.explanation;
   }
 }
@@ -84,7 +84,7 @@ TEST(SimulatedScenes, WithoutThePartAreRejected) {
   simulate::SimulateOptions options = small_scenes();
   options.absent_share = 1.0;
   for (const auto& simulated : scans_of(options)) {
-    const Detection detection = part().found_in(prepared(simulated), part().context);
+    const Detection detection = sought().found_in(prepared(simulated), sought().context);
     EXPECT_EQ(detection.status, Status::rejected) << simulated.name << ": " << detection.explanation;
     EXPECT_TRUE(detection.segment.empty());
   }
@@ -96,30 +96,30 @@ TEST(SimulatedScenes, WithASmallerCopyInItsPlaceAreRejected) {
   options.decoys = 1;
   options.decoy_scale = 0.78;
   for (const auto& simulated : scans_of(options)) {
-    const Detection detection = part().found_in(prepared(simulated), part().context);
+    const Detection detection = sought().found_in(prepared(simulated), sought().context);
     EXPECT_EQ(detection.status, Status::rejected) << simulated.name << ": " << detection.explanation;
   }
 }
 
 TEST(SimulatedScenes, WithTwoPartsAreAmbiguous) {
-  const double d = part().model.diameter;
+  const double d = sought().model.diameter;
   const Pose left = test::pose_at({-0.55 * d, 0, 3.0 * d}),
              right = test::pose_at({0.55 * d, 0, 3.0 * d}, {1.0, 2.0, 0.3});
   const scan::Scan scan = test::seen(
       {simulate::transformed(test::casing(), left), simulate::transformed(test::casing(), right)}, 0.4, 0.004);
-  const Detection detection = part().found_in(scan, part().context);
+  const Detection detection = sought().found_in(scan, sought().context);
   EXPECT_EQ(detection.status, Status::ambiguous) << detection.explanation;
   EXPECT_EQ(detection.reason, Reason::second_instance);
-  EXPECT_LT(std::min(part().error(detection, left.inverse()), part().error(detection, right.inverse())), 0.02);
+  EXPECT_LT(std::min(sought().error(detection, left.inverse()), sought().error(detection, right.inverse())), 0.02);
 }
 
 TEST(SimulatedScenes, AreJudgedAlikeByAnyNumberOfThreads) {
   simulate::SimulateOptions options = small_scenes();
   options.scans = 1;
   const scan::Scan scan = prepared(scans_of(options).front());
-  const Detection expected = part().found_in(scan, Context(1));
+  const Detection expected = sought().found_in(scan, Context(1));
   for (const int threads : {2, 3}) {
-    const Detection detection = part().found_in(scan, Context(threads));
+    const Detection detection = sought().found_in(scan, Context(threads));
     EXPECT_EQ(detection.best.model_from_scan.matrix(), expected.best.model_from_scan.matrix());
     EXPECT_EQ(detection.best.support, expected.best.support);
     EXPECT_EQ(detection.segment, expected.segment);
@@ -136,7 +136,7 @@ TEST(Segmentation, KeepsBossesAndDentsAndLeavesClutter) {
   options.as_built.bump_height_ratio = 0.03;
   for (const auto& simulated : scans_of(options)) {
     const scan::Scan scan = prepared(simulated);
-    const Detection detection = part().found_in(scan, part().context);
+    const Detection detection = sought().found_in(scan, sought().context);
     ASSERT_NE(detection.status, Status::rejected) << simulated.name << ": " << detection.explanation;
     std::vector<std::uint8_t> kept(scan.cloud.size(), 0);
     for (const std::uint32_t i : detection.segment) kept[i] = 1;
@@ -149,8 +149,8 @@ TEST(Segmentation, KeepsBossesAndDentsAndLeavesClutter) {
       }
       ++of_part, part_kept += kept[i];
       const Eigen::Vector3d point = *simulated.model_from_scan * scan.cloud.positions[i].cast<double>();
-      const auto nearest = part().model.surface->nearest(point, part().model.diameter);
-      if (std::abs(nearest.signed_distance) < 0.008 * part().model.diameter) continue;
+      const auto nearest = sought().model.surface->nearest(point, sought().model.diameter);
+      if (std::abs(nearest.signed_distance) < 0.008 * sought().model.diameter) continue;
       ++bumps, bumps_kept += kept[i];
     }
     const double segment = static_cast<double>(detection.segment.size());

@@ -10,18 +10,12 @@
 
 #include "asbuilt/simulate/mesh_edit.h"
 #include "support/parts.h"
+#include "unit/evaluate/surface_points.h"
 
 namespace asbuilt::evaluate {
 namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
-
-Points surface_points(const TriangleMesh& mesh, std::size_t count) {
-  Points points;
-  for (const auto& sample : simulate::area_samples(mesh, count, Random(1, "test", 0)))
-    points.push_back(sample.position);
-  return points;
-}
 
 template <class Predicate>
 Points where(const Points& points, const Predicate& holds) {
@@ -44,7 +38,7 @@ TEST(ReconstructionError, CountsFinitePointsFurtherThanTheDistanceOnBothSides) {
 TEST(ReconstructionError, CompletenessIsTheShareOfTheAreaThatIsThere) {
   const TriangleMesh mesh = simulate::box({60, 40, 20});
   const model::SurfaceDistance surface(mesh);
-  const Points all = surface_points(mesh, 40000);
+  const Points all = test::surface_points(mesh, 40000);
   EXPECT_EQ(completeness(all, all, 1.5, mesh, surface, Context(2)), 1.0);
   EXPECT_EQ(completeness({}, all, 1.5, mesh, surface, Context(2)), 0.0);
   EXPECT_EQ(completeness(all, {}, 1.5, mesh, surface, Context(2)), 1.0);
@@ -58,7 +52,7 @@ TEST(ReconstructionError, CompletenessIsTheShareOfTheAreaThatIsThere) {
 TEST(ReconstructionError, CompletenessAsksEachSideOfASheetForItself) {
   const TriangleMesh mesh = simulate::box({60, 60, 0.5});
   const model::SurfaceDistance surface(mesh);
-  const Points all = surface_points(mesh, 40000);
+  const Points all = test::surface_points(mesh, 40000);
   const Points top = where(all, [](const Eigen::Vector3d& p) { return p.z() > 0.249; });
   EXPECT_NEAR(completeness(top, all, 1.5, mesh, surface, Context(2)), 0.5, 0.02);
 }
@@ -66,7 +60,7 @@ TEST(ReconstructionError, CompletenessAsksEachSideOfASheetForItself) {
 TEST(ReconstructionError, PointsOffTheSurfaceCoverTheirFeet) {
   const TriangleMesh mesh = simulate::box({60, 40, 20});
   const model::SurfaceDistance surface(mesh);
-  const Points all = surface_points(mesh, 40000);
+  const Points all = test::surface_points(mesh, 40000);
   Points raised = all;
   for (Eigen::Vector3d& point : raised) point *= 1.02;
   EXPECT_GT(completeness(raised, all, 1.5, mesh, surface, Context(2)), 0.995);

@@ -8,16 +8,10 @@
 #include "asbuilt/simulate/mesh_edit.h"
 #include "support/matchers.h"
 #include "support/parts.h"
+#include "unit/evaluate/surface_points.h"
 
 namespace asbuilt::evaluate {
 namespace {
-
-std::vector<Eigen::Vector3d> surface_points(const TriangleMesh& mesh, std::size_t count) {
-  std::vector<Eigen::Vector3d> points;
-  for (const auto& sample : simulate::area_samples(mesh, count, Random(1, "test", 0)))
-    points.push_back(sample.position);
-  return points;
-}
 
 TEST(SurfaceError, MeanDistanceCountsAllFinitePointsOnBothSides) {
   const model::SurfaceDistance surface(simulate::box({20, 20, 20}));
@@ -35,7 +29,7 @@ TEST(SurfaceError, AlignmentUndoesAMotionExactly) {
   Vector6d twist;
   twist << 0.02, -0.03, 0.01, 2.0, -1.0, 1.5;
   const Pose moved = pose_from_twist(twist);
-  std::vector<Eigen::Vector3d> points = surface_points(mesh, 5000);
+  std::vector<Eigen::Vector3d> points = test::surface_points(mesh, 5000);
   for (Eigen::Vector3d& point : points) point = moved * point;
   const Pose found = best_motion_onto(points, mesh, surface, 0.1, Pose::Identity(), Context(2));
   EXPECT_THAT(found, test::PoseNear(moved.inverse(), 1e-4, 1e-4));
@@ -44,7 +38,7 @@ TEST(SurfaceError, AlignmentUndoesAMotionExactly) {
 TEST(SurfaceError, AlignmentIsNotBentByAFewPointsFarOff) {
   const TriangleMesh mesh = test::stepped_block();
   const model::SurfaceDistance surface(mesh);
-  std::vector<Eigen::Vector3d> points = surface_points(mesh, 4000);
+  std::vector<Eigen::Vector3d> points = test::surface_points(mesh, 4000);
   for (std::size_t i = 0; i < 100; ++i) points[40 * i] += Eigen::Vector3d(0, 0, 30.0);
   const Pose found = best_motion_onto(points, mesh, surface, 0.05, Pose::Identity(), Context(2));
   EXPECT_THAT(found, test::PoseNear(Pose::Identity(), 0.01, 0.01));  // least squares would shift by 0.5 mm and more

@@ -15,11 +15,11 @@ using test::sphere_model;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ(), kDown = -Eigen::Vector3d::UnitZ();
+const Eigen::Vector3d kAbove = Eigen::Vector3d::UnitZ(), kBelow = -Eigen::Vector3d::UnitZ();
 
 TEST(PoseGraph, OppositeViewsAreTwoPiecesAndThatIsAResult) {
-  const std::vector<PosedSegment> segments{cap(kUp, 0.5, Pose::Identity()), cap(kDown, 0.6, Pose::Identity()),
-                                           cap(kUp, 0.6, Pose::Identity())};
+  const std::vector<PosedSegment> segments{cap(kAbove, 0.5, Pose::Identity()), cap(kBelow, 0.6, Pose::Identity()),
+                                           cap(kAbove, 0.6, Pose::Identity())};
   const PoseGraph graph = build_graph(segments, sphere_model(), {}, Context(1)).value();
   EXPECT_THAT(graph.components, ElementsAre(ElementsAre(0, 2), ElementsAre(1)));
   EXPECT_EQ(best_missing_link(graph).first, -1) << "the pieces share nothing";
@@ -29,14 +29,14 @@ TEST(PoseGraph, TheBestMissingLinkIsTheStrongestBarBetweenPieces) {
   PoseGraphOptions options;
   options.edges.low = options.edges.high = 0.5;
   const Eigen::Vector3d side(std::sin(0.9), 0.0, std::cos(0.9));
-  const std::vector<PosedSegment> segments{cap(kUp, 0.6, Pose::Identity()), cap(side, 0.6, Pose::Identity())};
+  const std::vector<PosedSegment> segments{cap(kAbove, 0.6, Pose::Identity()), cap(side, 0.6, Pose::Identity())};
   const PoseGraph graph = build_graph(segments, sphere_model(), options, Context(1)).value();
   ASSERT_EQ(graph.components.size(), 2U);
   EXPECT_EQ(best_missing_link(graph), graph.overlaps.front());
 }
 
 TEST(PoseGraph, AnEmptySegmentIsANodeWithoutLinks) {
-  const std::vector<PosedSegment> segments{cap(kUp, 0.6, Pose::Identity()), PosedSegment{}};
+  const std::vector<PosedSegment> segments{cap(kAbove, 0.6, Pose::Identity()), PosedSegment{}};
   const PoseGraph graph = build_graph(segments, sphere_model(), {}, Context(1)).value();
   EXPECT_THAT(graph.overlaps, testing::IsEmpty());
   EXPECT_THAT(graph.components, ElementsAre(ElementsAre(0), ElementsAre(1)));
@@ -50,7 +50,7 @@ TEST(PoseGraph, NoScansMakeAnEmptyGraph) {
 TEST(PoseGraph, SparseAndDenseScansOfOnePlaceOverlapAlike) {
   const auto overlap = [](int density) {
     const Eigen::Vector3d side(std::sin(0.5), 0.0, std::cos(0.5));
-    const std::vector<PosedSegment> segments{cap(kUp, 0.8, Pose::Identity(), 40000),
+    const std::vector<PosedSegment> segments{cap(kAbove, 0.8, Pose::Identity(), 40000),
                                              cap(side, 0.8, Pose::Identity(), density)};
     return build_graph(segments, sphere_model(), {}, Context(1)).value().overlaps.front().overlap;
   };
@@ -61,13 +61,13 @@ TEST(PoseGraph, SparseAndDenseScansOfOnePlaceOverlapAlike) {
 TEST(PoseGraph, BadInputIsRefusedAndLeavesTheGraphAsItWas) {
   PoseGraphBuilder builder = PoseGraphBuilder::create(sphere_model(), {}).value();
   const Context context(1);
-  PosedSegment no_normals = cap(kUp, 0.6, Pose::Identity());
+  PosedSegment no_normals = cap(kAbove, 0.6, Pose::Identity());
   no_normals.segment_in_scan.normals.clear();
   EXPECT_THAT(builder.insert(no_normals, context).error().message, HasSubstr("normals"));
-  PosedSegment not_finite = cap(kUp, 0.6, Pose::Identity());
+  PosedSegment not_finite = cap(kAbove, 0.6, Pose::Identity());
   not_finite.segment_in_scan.positions[3].x() = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THAT(builder.insert(not_finite, context).error().message, HasSubstr("point 3 is not finite"));
-  PosedSegment scaled = cap(kUp, 0.6, Pose::Identity());
+  PosedSegment scaled = cap(kAbove, 0.6, Pose::Identity());
   scaled.model_from_scan.linear() *= 2.0;
   EXPECT_THAT(builder.insert(scaled, context).error().message, HasSubstr("rigid"));
   EXPECT_EQ(builder.scan_count(), 0);

@@ -15,11 +15,11 @@
 namespace asbuilt::inspect {
 namespace {
 
-constexpr double kEdge = 100.0;
+constexpr double kBoxEdge = 100.0;
 constexpr std::array<double, 6> kOffsets{0.3, -0.2, 0.5,
                                          0.1, -0.4, 0.25};  // of the sides -x, +x, -y, +y, -z, +z, outwards
 
-TriangleMesh box_mesh() { return test::joined(test::box({0, 0, 0}, {kEdge, kEdge, kEdge})); }
+TriangleMesh box_mesh() { return test::joined(test::box({0, 0, 0}, {kBoxEdge, kBoxEdge, kBoxEdge})); }
 
 /// Points on the chosen sides of the cube, each moved outwards by its offset.
 PointCloud sides(const std::vector<int>& chosen) {
@@ -27,10 +27,10 @@ PointCloud sides(const std::vector<int>& chosen) {
   for (const int side : chosen) {
     const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
     const double offset = kOffsets[static_cast<std::size_t>(side)];
-    for (double a = 0.5; a < kEdge; a += 1.0) {
-      for (double b = 0.5; b < kEdge; b += 1.0) {
+    for (double a = 0.5; a < kBoxEdge; a += 1.0) {
+      for (double b = 0.5; b < kBoxEdge; b += 1.0) {
         Eigen::Vector3d p;
-        p[axis] = side % 2 == 1 ? kEdge + offset : -offset;
+        p[axis] = side % 2 == 1 ? kBoxEdge + offset : -offset;
         p[u] = a;
         p[v] = b;
         cloud.positions.push_back(p.cast<float>());
@@ -74,8 +74,8 @@ TEST(ClosedMesh, OfAPartMeasuredOnAllSidesIsThePartWithItsSharpEdges) {
   EXPECT_EQ(unmatched_sides(whole.mesh), 0U);
   EXPECT_EQ(whole.holes_closed, 0U);
   EXPECT_EQ(std::ranges::count(whole.filled, 1), 0);
-  const double expected =
-      (kEdge + kOffsets[0] + kOffsets[1]) * (kEdge + kOffsets[2] + kOffsets[3]) * (kEdge + kOffsets[4] + kOffsets[5]);
+  const double expected = (kBoxEdge + kOffsets[0] + kOffsets[1]) * (kBoxEdge + kOffsets[2] + kOffsets[3]) *
+                          (kBoxEdge + kOffsets[4] + kOffsets[5]);
   EXPECT_NEAR(volume(whole.mesh), expected, 1e-4 * expected);
   // The corner of the faces -x, -y, -z, which CAD has at the origin.
   const Eigen::Vector3d corner(-kOffsets[0], -kOffsets[2], -kOffsets[4]);
@@ -89,16 +89,16 @@ TEST(ClosedMesh, MarksWhatWasNotMeasuredAndReturnsToTheCadThere) {
   for (std::size_t i = 0; i < half.mesh.vertices.size(); ++i) {
     const Eigen::Vector3d& v = half.mesh.vertices[i];
     EXPECT_EQ(half.filled[i] != 0, std::isnan(half.deviation_mm[i]));
-    const bool inside_top = v.z() > kEdge - 1.0 && (v - Eigen::Vector3d(50, 50, v.z())).cwiseAbs().maxCoeff() < 45.0;
+    const bool inside_top = v.z() > kBoxEdge - 1.0 && (v - Eigen::Vector3d(50, 50, v.z())).cwiseAbs().maxCoeff() < 45.0;
     if (inside_top) {
       EXPECT_EQ(half.filled[i], 0);
-      EXPECT_NEAR(v.z(), kEdge + kOffsets[5], 1e-3);
-    } else if (v.z() < kEdge - 10.0) {
+      EXPECT_NEAR(v.z(), kBoxEdge + kOffsets[5], 1e-3);
+    } else if (v.z() < kBoxEdge - 10.0) {
       EXPECT_EQ(half.filled[i], 1);
     }
     // Six return lengths below the rim exp(-6) of its displacement is left.
-    if (v.z() < kEdge - 6.0 * 0.05 * std::sqrt(3.0) * kEdge) {
-      EXPECT_LT((v - v.cwiseMax(0.0).cwiseMin(kEdge)).norm(), 0.003);
+    if (v.z() < kBoxEdge - 6.0 * 0.05 * std::sqrt(3.0) * kBoxEdge) {
+      EXPECT_LT((v - v.cwiseMax(0.0).cwiseMin(kBoxEdge)).norm(), 0.003);
     }
   }
 }
@@ -112,7 +112,7 @@ TEST(ClosedMesh, ClosesAHoleOfTheModelAndSaysSo) {
   const ClosedMesh whole = closed(open, sides({0, 1, 2, 3, 5})).value();
   EXPECT_EQ(unmatched_sides(whole.mesh), 0U);
   EXPECT_EQ(whole.holes_closed, 1U);
-  EXPECT_NEAR(volume(whole.mesh), std::pow(kEdge, 3), 0.02 * std::pow(kEdge, 3));
+  EXPECT_NEAR(volume(whole.mesh), std::pow(kBoxEdge, 3), 0.02 * std::pow(kBoxEdge, 3));
 }
 
 TEST(ClosedMesh, OfNothingMeasuredIsRefused) {

@@ -12,11 +12,11 @@
 namespace asbuilt::inspect {
 namespace {
 
-constexpr double kEdge = 100.0;
+constexpr double kPartEdge = 100.0;
 
-const model::PreparedModel& cube() {
+const model::PreparedModel& cubic_part() {
   static const model::PreparedModel model =
-      model::prepare(test::joined(test::box({0, 0, 0}, {kEdge, kEdge, kEdge})), {}, Context(2)).value();
+      model::prepare(test::joined(test::box({0, 0, 0}, {kPartEdge, kPartEdge, kPartEdge})), {}, Context(2)).value();
   return model;
 }
 
@@ -24,10 +24,10 @@ const model::PreparedModel& cube() {
 template <class Height>
 void add_side(PointCloud& cloud, int axis, bool high, double step, const Height& height) {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  for (double a = 0.5 * step; a < kEdge; a += step) {
-    for (double b = 0.5 * step; b < kEdge; b += step) {
+  for (double a = 0.5 * step; a < kPartEdge; a += step) {
+    for (double b = 0.5 * step; b < kPartEdge; b += step) {
       Eigen::Vector3d p;
-      p[axis] = high ? kEdge + height(a, b) : -height(a, b);
+      p[axis] = high ? kPartEdge + height(a, b) : -height(a, b);
       p[u] = a;
       p[v] = b;
       cloud.positions.push_back(p.cast<float>());
@@ -55,14 +55,14 @@ double dent(double a, double b, double depth, double radius) {
 
 TEST(Spots, StateTheErrorThatTheyHave) {
   const double sigma = 0.2;
-  const DeviationReport report = inspect(all_sides(1.0, sigma), cube(), {}, Context(2)).value();
+  const DeviationReport report = inspect(all_sides(1.0, sigma), cubic_part(), {}, Context(2)).value();
   EXPECT_NEAR(report.noise_sigma_mm, sigma, 0.1 * sigma);
   double squares = 0.0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < report.spots.size(); ++i) {
-    const Eigen::Vector3d p = cube().dense_samples.positions[i].cast<double>();
+    const Eigen::Vector3d p = cubic_part().dense_samples.positions[i].cast<double>();
     int far_from_edges = 0;  // there the nearest surface is another side's, and noise is folded
-    for (int axis = 0; axis < 3; ++axis) far_from_edges += p[axis] > 4.0 && p[axis] < kEdge - 4.0 ? 1 : 0;
+    for (int axis = 0; axis < 3; ++axis) far_from_edges += p[axis] > 4.0 && p[axis] < kPartEdge - 4.0 ? 1 : 0;
     if (!report.spots[i].is_scanned() || far_from_edges < 2) continue;
     const double pull = static_cast<double>(report.spots[i].deviation_mm / report.spots[i].standard_error_mm);
     squares += pull * pull;
@@ -93,12 +93,12 @@ TEST(Spots, OfAMergedCloudKnowThatItsPointsShareTheirNoise) {
     }
     return sum / 9.0;
   });
-  const DeviationReport report = inspect(cloud, cube(), {}, Context(2)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), {}, Context(2)).value();
   EXPECT_LT(report.noise_sigma_mm, 0.4 * sigma);
   double squares = 0.0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < report.spots.size(); ++i) {
-    const Eigen::Vector3d p = cube().dense_samples.positions[i].cast<double>();
+    const Eigen::Vector3d p = cubic_part().dense_samples.positions[i].cast<double>();
     if (!report.spots[i].is_scanned() || std::max(std::abs(p.x() - 50.0), std::abs(p.y() - 50.0)) > 45.0) continue;
     const double pull = static_cast<double>(report.spots[i].deviation_mm / report.spots[i].standard_error_mm);
     squares += pull * pull;
@@ -119,7 +119,7 @@ TEST(Spots, TakeInHowWellAScanIsPlaced) {
   const std::vector<ScanPose> poses{pose};
   Measurement measurement{cloud, scan};
   measurement.poses = poses;
-  const DeviationReport report = inspect(measurement, cube(), {}, Context(1)).value();
+  const DeviationReport report = inspect(measurement, cubic_part(), {}, Context(1)).value();
   for (const Spot& spot : report.spots) {
     if (!spot.is_scanned()) continue;
     EXPECT_EQ(spot.scan, 4);
@@ -140,7 +140,7 @@ TEST(Spots, DoNotReachBeyondHalfASpacingOfARimNorOverAHole) {
       kept.positions.push_back(cloud.positions[i]);
       kept.normals.push_back(cloud.normals[i]);
     }
-    return inspect(kept, cube(), {}, Context(1)).value().coverage;
+    return inspect(kept, cubic_part(), {}, Context(1)).value().coverage;
   };
   // Of the whole side as it is found: where samples of its own rim belong is another matter.
   const double side = keep([](const Eigen::Vector3d&) { return true; });
@@ -159,12 +159,12 @@ TEST(Regions, MeasureADentWithoutLevellingIt) {
   PointCloud cloud;
   add_side(cloud, 2, true, 0.8,
            [&](double a, double b) { return dent(a, b, depth, radius) + sigma * random.normal(); });
-  const DeviationReport report = inspect(cloud, cube(), {.tolerance = Tolerance{-0.5, 0.5}}, Context(2)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), {.tolerance = Tolerance{-0.5, 0.5}}, Context(2)).value();
   ASSERT_EQ(report.regions.size(), 1U);
   const Region& region = report.regions.front();
   EXPECT_NEAR(region.peak.deviation_mm, -depth, std::max(0.3 * sigma, 3.0 * region.peak.standard_error_mm));
   EXPECT_LT(region.peak.standard_error_mm, 0.5 * sigma);
-  EXPECT_NEAR((region.peak.point - Eigen::Vector3d(50, 50, kEdge)).norm(), 0.0, 1.5);
+  EXPECT_NEAR((region.peak.point - Eigen::Vector3d(50, 50, kPartEdge)).norm(), 0.0, 1.5);
   // Deeper than 0.5 of 2.0 within r = R sqrt(1 - sqrt(0.25)).
   const double true_radius = radius * std::sqrt(0.5);
   EXPECT_NEAR(region.area_mm2, std::numbers::pi * true_radius * true_radius, 0.12 * region.area_mm2);
@@ -177,14 +177,14 @@ TEST(Regions, AreCountedWhereNotAllAreGiven) {
   PointCloud cloud;
   const auto in_pad = [](double x) { return std::fmod(x, 12.5) > 3.0 && std::fmod(x, 12.5) < 9.5; };
   add_side(cloud, 2, true, 0.5, [&](double a, double b) { return in_pad(a) && in_pad(b) ? 1.0 : 0.0; });
-  const DeviationReport report = inspect(cloud, cube(), {.tolerance = Tolerance{-0.5, 0.5}}, Context(2)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), {.tolerance = Tolerance{-0.5, 0.5}}, Context(2)).value();
   EXPECT_EQ(report.regions_found, 64U);  // eight rows of eight pads
   EXPECT_EQ(report.regions.size(), RegionOptions{}.most);
 }
 
 TEST(Regions, AreNotInventedInNoise) {
   const DeviationReport report =
-      inspect(all_sides(1.0, 0.2), cube(), {.tolerance = Tolerance{-0.4, 0.4}}, Context(2)).value();
+      inspect(all_sides(1.0, 0.2), cubic_part(), {.tolerance = Tolerance{-0.4, 0.4}}, Context(2)).value();
   EXPECT_TRUE(report.regions.empty());
   EXPECT_EQ(report.verdict, Verdict::pass);
 }
@@ -199,7 +199,7 @@ TEST(Tolerances, HoldPerBoxAndLeaveTheRestAlone) {
                    {-0.1, 0.1},
                    1};
   options.tolerances.rows.push_back(row);
-  const DeviationReport report = inspect(cloud, cube(), options, Context(1)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), options, Context(1)).value();
   ASSERT_EQ(report.boxes.size(), 1U);
   EXPECT_EQ(report.boxes[0].verdict, Verdict::fail);
   EXPECT_NEAR(report.boxes[0].statistics.mean, 0.3, 1e-3);
@@ -210,7 +210,7 @@ TEST(Tolerances, HoldPerBoxAndLeaveTheRestAlone) {
 TEST(Tolerances, RefuseAFaceThatIsNotThere) {
   InspectOptions options;
   options.tolerances.rows.push_back({"face 3", 3, std::nullopt, {-1, 1}, 12});
-  const auto report = inspect(all_sides(5.0), cube(), options, Context(1));
+  const auto report = inspect(all_sides(5.0), cubic_part(), options, Context(1));
   ASSERT_FALSE(report.has_value());
   EXPECT_THAT(report.error().message, ::testing::HasSubstr("line 12"));
 }
@@ -218,7 +218,7 @@ TEST(Tolerances, RefuseAFaceThatIsNotThere) {
 /// The cube with two triangles a CAD face, all but the last called by a name; two share one.
 const model::PreparedModel& named_cube() {
   static const model::PreparedModel model = [] {
-    TriangleMesh mesh = test::joined(test::box({0, 0, 0}, {kEdge, kEdge, kEdge}));
+    TriangleMesh mesh = test::joined(test::box({0, 0, 0}, {kPartEdge, kPartEdge, kPartEdge}));
     for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) mesh.cad_faces.push_back(t / 2);
     model::PreparedModel prepared = model::prepare(mesh, {}, Context(2)).value();
     prepared.face_names = {{"bore A", ""}, {"rim", ""}, {"rim", ""}, {"<script>", ""}, {"foot", ""}};
@@ -261,7 +261,7 @@ TEST(Tolerances, OfANameThatNoFaceOrMoreThanOneBearsAreRefused) {
                     HasSubstr("face 1 \"rim\", face 2 \"rim\"")));
   EXPECT_THAT(refusal_of("bore A,-1,1\n0,-2,2\n", named_cube()),
               AllOf(HasSubstr("line 2"), HasSubstr("second tolerance")));
-  EXPECT_THAT(refusal_of("rim,-1,1\n", cube()), AllOf(HasSubstr("line 1"), HasSubstr("mesh"), HasSubstr("box")));
+  EXPECT_THAT(refusal_of("rim,-1,1\n", cubic_part()), AllOf(HasSubstr("line 1"), HasSubstr("mesh"), HasSubstr("box")));
 }
 
 TEST(BestFit, TakesARigidMotionBackAndNeverAScale) {
@@ -273,7 +273,7 @@ TEST(BestFit, TakesARigidMotionBackAndNeverAScale) {
   for (auto& n : cloud.normals) n = (moved.linear() * n.cast<double>()).cast<float>();
   InspectOptions options;
   options.alignment.method = AlignmentMethod::best_fit;
-  const DeviationReport report = inspect(cloud, cube(), options, Context(2)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), options, Context(2)).value();
   EXPECT_TRUE((report.alignment.model_from_given * moved).isApprox(Pose::Identity(), 1e-4));
   EXPECT_NEAR(report.over_points.rms, 0.0, 2e-3);
   EXPECT_LT(report.alignment.rms_after_mm, 0.05 * report.alignment.rms_before_mm);
@@ -281,7 +281,7 @@ TEST(BestFit, TakesARigidMotionBackAndNeverAScale) {
   // A part that is 1 % too large stays too large: each side by half a millimetre.
   PointCloud large = all_sides(2.0);
   for (auto& p : large.positions) p = ((p.array() - 50.0F) * 1.01F + 50.0F).matrix();
-  const DeviationReport grown = inspect(large, cube(), options, Context(2)).value();
+  const DeviationReport grown = inspect(large, cubic_part(), options, Context(2)).value();
   EXPECT_NEAR(grown.over_points.mean, 0.5, 0.01);
 }
 
@@ -297,7 +297,7 @@ TEST(BestFit, OnSomePlacesLeavesTheRestToDeviate) {
   options.alignment.method = AlignmentMethod::best_fit;
   options.alignment.place_radius_ratio = 0.2;
   options.alignment.places = {{50, 50, 0}, {0, 50, 40}, {100, 50, 40}, {50, 0, 40}, {50, 100, 40}};
-  const DeviationReport report = inspect(cloud, cube(), options, Context(2)).value();
+  const DeviationReport report = inspect(cloud, cubic_part(), options, Context(2)).value();
   EXPECT_EQ(report.alignment.on, "5 places");
   EXPECT_NEAR(report.over_points.max, 0.8, 0.01);
   EXPECT_NEAR(report.over_points.median, 0.0, 0.01);
@@ -307,7 +307,7 @@ TEST(BestFit, RefusesFacesOfAMesh) {
   InspectOptions options;
   options.alignment.method = AlignmentMethod::best_fit;
   options.alignment.faces = {2};
-  EXPECT_FALSE(inspect(all_sides(5.0), cube(), options, Context(1)).has_value());
+  EXPECT_FALSE(inspect(all_sides(5.0), cubic_part(), options, Context(1)).has_value());
 }
 
 TEST(ReferencePoints, AreReadWithAndWithoutNameAndSigma) {
@@ -327,10 +327,11 @@ TEST(ReferencePoints, GetTheHeightOfTheReconstructionOverThem) {
   PointCloud cloud;
   add_side(cloud, 2, true, 1.0, [](double, double) { return 0.25; });
   InspectOptions options;
-  options.reference = {{"top", {30, 40, kEdge}, 0.05}, {"below", {60, 40, kEdge + 0.4}, {}}, {"side", {0, 50, 50}, {}}};
+  options.reference = {
+      {"top", {30, 40, kPartEdge}, 0.05}, {"below", {60, 40, kPartEdge + 0.4}, {}}, {"side", {0, 50, 50}, {}}};
   for (const bool with_normals : {true, false}) {
     if (!with_normals) cloud.normals.clear();
-    const DeviationReport report = inspect(cloud, cube(), options, Context(1)).value();
+    const DeviationReport report = inspect(cloud, cubic_part(), options, Context(1)).value();
     const auto& deviations = report.reference->deviations;
     EXPECT_NEAR(deviations[0].deviation_mm, 0.25, 1e-4);
     EXPECT_TRUE(deviations[0].significant.value());

@@ -13,12 +13,11 @@
 
 #include "asbuilt/io/e57_writer.h"
 #include "asbuilt/io/scan_file.h"
+#include "unit/io/scans.h"
 #include "unit/io/temporary_folder.h"
 
 namespace asbuilt::io {
 namespace {
-
-const std::filesystem::path kFormats = std::filesystem::path(ASBUILT_DATA_DIR) / "formats";
 
 std::string web_e57() {
   const char* folder = std::getenv("ASBUILT_WEB_E57");
@@ -71,11 +70,11 @@ void expect_same(const std::vector<Eigen::Vector3d>& ours, const std::vector<Eig
 
 TEST(E57BesideWebE57, BothReadTheSamePointsOfFilesOfOtherSoftware) {
   SKIP_WITHOUT_WEB_E57();
-  if (!std::filesystem::exists(kFormats)) GTEST_SKIP() << kFormats << " is not there";
+  if (!std::filesystem::exists(test::kFormats)) GTEST_SKIP() << test::kFormats << " is not there";
   for (const char* name :
        {"bunnyDouble", "bunnyInt21", "ColouredCubeDouble", "tinyCartesianFloatRgb", "tiny_spherical",
         "scaled_integer_intensity", "testWithNormals", "translationWithoutRotation", "A_B", "A_moved_B"}) {
-    const auto path = kFormats / (std::string(name) + ".e57");
+    const auto path = test::kFormats / (std::string(name) + ".e57");
     expect_same(points_by_us(path), points_by_web_e57(path), name);
   }
 }

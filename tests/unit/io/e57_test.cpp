@@ -13,6 +13,7 @@
 #include "asbuilt/io/e57_writer.h"
 #include "asbuilt/io/scan_file.h"
 #include "unit/io/e57_bytes.h"
+#include "unit/io/scans.h"
 #include "unit/io/temporary_folder.h"
 
 namespace asbuilt::io {
@@ -22,10 +23,8 @@ using test::E57Builder;
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 
-const std::filesystem::path kFormats = std::filesystem::path(ASBUILT_DATA_DIR) / "formats";
-
 #define SKIP_WITHOUT_FORMATS() \
-  if (!std::filesystem::exists(kFormats)) GTEST_SKIP() << kFormats << " is not there"
+  if (!std::filesystem::exists(test::kFormats)) GTEST_SKIP() << test::kFormats << " is not there"
 
 TEST(Crc32c, GivesTheCheckValueOfItsDefinition) {
   EXPECT_EQ(crc32c("123456789"), 0xE3069283u);  // RFC 3720, B.4
@@ -171,8 +170,8 @@ TEST(E57, LargeCoordinatesKeepTheirPrecision) {
 // Counts and places as the README beside the files tells them, or as follows from how they were made.
 TEST(E57OfOtherSoftware, BunnyInDoubleAndInScaledIntegersIsTheSameCloud) {
   SKIP_WITHOUT_FORMATS();
-  const auto exact = read_scans(kFormats / "bunnyDouble.e57", Unit::stated);
-  const auto packed = read_scans(kFormats / "bunnyInt21.e57", Unit::stated);
+  const auto exact = read_scans(test::kFormats / "bunnyDouble.e57", Unit::stated);
+  const auto packed = read_scans(test::kFormats / "bunnyInt21.e57", Unit::stated);
   ASSERT_TRUE(exact && packed);
   ASSERT_EQ(exact->front().cloud.size(), 30571u);
   ASSERT_EQ(packed->front().cloud.size(), 30571u);
@@ -184,7 +183,7 @@ TEST(E57OfOtherSoftware, BunnyInDoubleAndInScaledIntegersIsTheSameCloud) {
 
 TEST(E57OfOtherSoftware, EveryValidFileIsReadAndEveryInvalidOneRefused) {
   SKIP_WITHOUT_FORMATS();
-  const auto read = [](const char* name) { return read_scans(kFormats / name, Unit::stated); };
+  const auto read = [](const char* name) { return read_scans(test::kFormats / name, Unit::stated); };
   const auto spherical = read("tiny_spherical.e57");
   ASSERT_TRUE(spherical) << spherical.error().message;
   EXPECT_EQ(spherical->front().cloud.size(), 360u);

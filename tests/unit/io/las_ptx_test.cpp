@@ -6,6 +6,7 @@
 
 #include "asbuilt/io/scan_file.h"
 #include "unit/io/las_bytes.h"
+#include "unit/io/scans.h"
 #include "unit/io/temporary_folder.h"
 
 namespace asbuilt::io {
@@ -14,8 +15,6 @@ namespace {
 using test::TemporaryFolder;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-
-const std::filesystem::path kFormats = std::filesystem::path(ASBUILT_DATA_DIR) / "formats";
 
 const std::string kPtx =
     "2\n3\n10 20 30\n1 0 0\n0 1 0\n0 0 1\n"
@@ -119,9 +118,9 @@ TEST(Las, CompressedFilesAreRefusedWithTheRemedy) {
 }
 
 TEST(LasOfOtherSoftware, HasThePointsThatItsReadmeTells) {
-  if (!std::filesystem::exists(kFormats)) GTEST_SKIP() << kFormats << " is not there";
+  if (!std::filesystem::exists(test::kFormats)) GTEST_SKIP() << test::kFormats << " is not there";
   const auto points = [](const char* name) {
-    const auto scans = read_scans(kFormats / name, Unit::metre);
+    const auto scans = read_scans(test::kFormats / name, Unit::metre);
     return scans ? static_cast<int>(scans->front().cloud.size()) : -1;
   };
   EXPECT_EQ(points("simple.las"), 1065);
@@ -129,7 +128,7 @@ TEST(LasOfOtherSoftware, HasThePointsThatItsReadmeTells) {
   EXPECT_EQ(points("test1_4.las"), 1000);
   EXPECT_EQ(points("gps-time-nan.las"), 1);
   EXPECT_EQ(points("no-points.las"), 0);
-  const auto lying = read_scans(kFormats / "garbage_nVariableLength.las", Unit::metre);
+  const auto lying = read_scans(test::kFormats / "garbage_nVariableLength.las", Unit::metre);
   ASSERT_FALSE(lying);
   EXPECT_THAT(lying.error().message, HasSubstr("the file ends after 718 of 719 points"));
 }

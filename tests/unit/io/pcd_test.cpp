@@ -7,6 +7,7 @@
 #include "asbuilt/io/lzf.h"
 #include "asbuilt/io/scan_file.h"
 #include "unit/io/bytes.h"
+#include "unit/io/scans.h"
 #include "unit/io/temporary_folder.h"
 
 namespace asbuilt::io {
@@ -14,7 +15,9 @@ namespace {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
+using test::error_of;
 using test::little;
+using test::only_scan;
 using test::TemporaryFolder;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -26,17 +29,6 @@ std::string head(const std::string& fields, const std::string& sizes, const std:
   return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " +
          types + "\nCOUNT " + counts + "\nWIDTH " + std::to_string(points) + "\nHEIGHT 1\nVIEWPOINT " + viewpoint +
          "\nPOINTS " + std::to_string(points) + "\nDATA " + data + "\n";
-}
-
-ScanFile only_scan(const std::filesystem::path& path, Unit unit = Unit::stated) {
-  auto scans = read_scans(path, unit);
-  EXPECT_TRUE(scans) << (scans ? "" : scans.error().message);
-  return std::move(scans.value().at(0));
-}
-
-std::string error_of(const std::filesystem::path& path) {
-  const auto scans = read_scans(path, Unit::stated);
-  return scans ? "no error" : scans.error().message;
 }
 
 TEST(PcdScan, ReadsAscii) {

@@ -10,6 +10,7 @@
 #include "asbuilt/io/ply_writer.h"
 #include "asbuilt/io/scan_file.h"
 #include "unit/io/bytes.h"
+#include "unit/io/scans.h"
 #include "unit/io/temporary_folder.h"
 
 namespace asbuilt::io {
@@ -19,25 +20,13 @@ using Eigen::Vector3d;
 using Eigen::Vector3f;
 using Eigen::Vector3i;
 using test::big;
+using test::error_of;
 using test::little;
+using test::only_scan;
 using test::TemporaryFolder;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-ScanFile only_scan(const std::filesystem::path& path, Unit unit = Unit::stated) {
-  auto scans = read_scans(path, unit);
-  EXPECT_TRUE(scans) << (scans ? "" : scans.error().message);
-  EXPECT_EQ(scans.value().size(), 1u);
-  return std::move(scans.value().at(0));
-}
-
-std::string error_of(const std::filesystem::path& path) {
-  const auto scans = read_scans(path, Unit::stated);
-  if (scans) return "no error";
-  EXPECT_EQ(scans.error().code, ErrorCode::unreadable_input);
-  return scans.error().message;
-}
 
 TEST(PlyScan, ReadsAsciiWithCommentsAndWindowsLineEnds) {
   const TemporaryFolder folder;

@@ -17,7 +17,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 /// The one message that scan and mesh readers must agree on.
-std::string error_of(const std::filesystem::path& path) {
+std::string shared_error_of(const std::filesystem::path& path) {
   const auto scans = read_scans(path, Unit::stated);
   const auto mesh = read_mesh(path, Unit::stated);
   if (scans || mesh) return "no error";
@@ -28,11 +28,11 @@ std::string error_of(const std::filesystem::path& path) {
 
 TEST(FileKind, KnownButUnsupportedKindsAreRefusedByTheirContentWithAWayOut) {
   const TemporaryFolder folder;
-  EXPECT_THAT(error_of(folder.file("scan.ply", "%PDF-1.4\n")),
+  EXPECT_THAT(shared_error_of(folder.file("scan.ply", "%PDF-1.4\n")),
               AllOf(HasSubstr("is a PDF document, which is not read"), HasSubstr("export it as STL")));
-  EXPECT_THAT(error_of(folder.file("part", "PK\x03\x04")), HasSubstr("ZIP archive"));
-  EXPECT_THAT(error_of(folder.file("Part.SLDPRT", "whatever")), HasSubstr("is a SolidWorks part"));
-  EXPECT_THAT(error_of(folder.file("hall.fls", "whatever")), HasSubstr("export it as PLY or PCD"));
+  EXPECT_THAT(shared_error_of(folder.file("part", "PK\x03\x04")), HasSubstr("ZIP archive"));
+  EXPECT_THAT(shared_error_of(folder.file("Part.SLDPRT", "whatever")), HasSubstr("is a SolidWorks part"));
+  EXPECT_THAT(shared_error_of(folder.file("hall.fls", "whatever")), HasSubstr("export it as PLY or PCD"));
 }
 
 TEST(FileKind, ScansAndModelsAreToldApartWhereTheOtherIsWanted) {
@@ -51,11 +51,11 @@ TEST(FileKind, ScansAndModelsAreToldApartWhereTheOtherIsWanted) {
 
 TEST(FileKind, UnknownKindsAreRefusedWithTheListOfTheKnown) {
   const TemporaryFolder folder;
-  EXPECT_THAT(error_of(folder.file("notes.doc", "hello")),
+  EXPECT_THAT(shared_error_of(folder.file("notes.doc", "hello")),
               AllOf(HasSubstr("extension '.doc'"), HasSubstr(".ply, .pcd, .e57"), HasSubstr(".stl, .ply, .obj, .off")));
-  EXPECT_THAT(error_of(folder.file("empty.ply", "")), HasSubstr("empty.ply: the file is empty"));
-  EXPECT_THAT(error_of(folder.path()), HasSubstr("is a folder"));
-  EXPECT_THAT(error_of(folder.path() / "none.ply"), HasSubstr("none.ply: there is no such file"));
+  EXPECT_THAT(shared_error_of(folder.file("empty.ply", "")), HasSubstr("empty.ply: the file is empty"));
+  EXPECT_THAT(shared_error_of(folder.path()), HasSubstr("is a folder"));
+  EXPECT_THAT(shared_error_of(folder.path() / "none.ply"), HasSubstr("none.ply: there is no such file"));
 }
 
 TEST(FileKind, ContentCountsMoreThanTheExtension) {
@@ -70,7 +70,8 @@ TEST(FileKind, ContentCountsMoreThanTheExtension) {
                 .at(0)
                 .format,
             "pcd ascii");
-  EXPECT_THAT(error_of(folder.file("scan.ply", "1 2 3\n")), HasSubstr("line 1: the file does not begin with 'ply'"));
+  EXPECT_THAT(shared_error_of(folder.file("scan.ply", "1 2 3\n")),
+              HasSubstr("line 1: the file does not begin with 'ply'"));
 }
 
 }  // namespace

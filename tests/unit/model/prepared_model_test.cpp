@@ -14,17 +14,17 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const Context kContext(2);
+const Context kTwoThreads(2);
 
 Error error_of(const TriangleMesh& mesh, const ModelOptions& options = {}) {
-  const auto result = prepare(mesh, options, kContext);
+  const auto result = prepare(mesh, options, kTwoThreads);
   return result ? Error{ErrorCode::invalid_argument, "there was no error"} : result.error();
 }
 
 TEST(Prepare, TurnsABoxWithABoxInsideIntoTheOuterOne) {
   const PreparedModel model =
       prepare(test::together(test::box({0, 0, 0}, {100, 80, 60}, 4), test::box({20, 20, 20}, {50, 50, 40}, 2)), {},
-              kContext)
+              kTwoThreads)
           .value();
   EXPECT_NEAR(surface_area(model.skin), 2.0 * (100 * 80 + 80 * 60 + 60 * 100), 1e-6);
   EXPECT_NEAR(test::sixfold_volume(model.skin) / 6.0, 100.0 * 80.0 * 60.0, 1e-6);
@@ -38,7 +38,7 @@ TEST(Prepare, TurnsABoxWithABoxInsideIntoTheOuterOne) {
 }
 
 TEST(Prepare, GivesEverythingThatTheStagesNeed) {
-  const PreparedModel model = prepare(test::sphere({5, 5, 5}, 50.0, 4), {}, kContext).value();
+  const PreparedModel model = prepare(test::sphere({5, 5, 5}, 50.0, 4), {}, kTwoThreads).value();
   ASSERT_TRUE(model.surface && model.field && model.rays);
   EXPECT_EQ(model.face_normals.size(), model.skin.triangles.size());
   EXPECT_TRUE(model.rays->first_hit({5, 5, 500}, {0, 0, -1}).found());
@@ -60,7 +60,7 @@ TEST(Prepare, GivesEverythingThatTheStagesNeed) {
 TEST(Prepare, ObeysTheSamplingRatio) {
   ModelOptions options;
   options.sampling_ratio = 0.1;
-  const PreparedModel model = prepare(test::box({0, 0, 0}, {30, 40, 120}, 2), options, kContext).value();
+  const PreparedModel model = prepare(test::box({0, 0, 0}, {30, 40, 120}, 2), options, kTwoThreads).value();
   EXPECT_NEAR(model.sampling_distance, 13.0, 1e-9);  // 30, 40, 120: a diagonal of 130
 }
 
@@ -80,7 +80,7 @@ TEST(Prepare, FindsTheExtentsOfATurnedBox) {
 }
 
 TEST(Prepare, MeasuresThinWalls) {
-  const PreparedModel plate = prepare(test::box({0, 0, 0}, {100, 100, 3}, 4), {}, kContext).value();
+  const PreparedModel plate = prepare(test::box({0, 0, 0}, {100, 100, 3}, 4), {}, kTwoThreads).value();
   EXPECT_NEAR(plate.report.thin_wall, 3.0, 0.01);
   EXPECT_LE(plate.field->voxel_mm(), 1.5);
 }
@@ -106,7 +106,7 @@ TEST(Prepare, DoesNotChangeWithTheUnit) {
       test::together(test::sphere({0, 0, 0}, 0.05, 3), test::box({0.04, -0.01, -0.01}, {0.09, 0.01, 0.01}));
   TriangleMesh large = small;
   for (Eigen::Vector3d& vertex : large.vertices) vertex *= 1024.0;
-  const PreparedModel a = prepare(small, {}, kContext).value(), b = prepare(large, {}, kContext).value();
+  const PreparedModel a = prepare(small, {}, kTwoThreads).value(), b = prepare(large, {}, kTwoThreads).value();
   EXPECT_EQ(a.skin.triangles, b.skin.triangles);
   ASSERT_EQ(a.samples.size(), b.samples.size());
   EXPECT_NEAR(b.sampling_distance, 1024.0 * a.sampling_distance, 1e-9);
@@ -140,7 +140,7 @@ TEST(Prepare, RefusesCoordinatesThatAreNotFiniteAndNamesTheVertex) {
 TEST(Prepare, IgnoresVerticesThatNoTriangleUses) {
   TriangleMesh mesh = test::box({0, 0, 0}, {10, 10, 10});
   mesh.vertices.emplace_back(std::nan(""), 1e30, 0);
-  EXPECT_NEAR(prepare(mesh, {}, kContext).value().diameter, std::sqrt(300.0), 1e-9);
+  EXPECT_NEAR(prepare(mesh, {}, kTwoThreads).value().diameter, std::sqrt(300.0), 1e-9);
 }
 
 TEST(Prepare, RefusesIndicesOutOfRange) {
@@ -153,7 +153,7 @@ TEST(Prepare, TakesASingleTriangle) {
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 10, 0}};
   mesh.triangles = {{0, 1, 2}};
-  const PreparedModel model = prepare(mesh, {}, kContext).value();
+  const PreparedModel model = prepare(mesh, {}, kTwoThreads).value();
   EXPECT_EQ(model.skin.triangles.size(), 1U);
   EXPECT_EQ(model.report.open_edges, 3U);
   EXPECT_GT(model.samples.size(), 10U);

@@ -24,8 +24,8 @@ using verify::Status;
 TriangleMesh mirrored(const TriangleMesh& mesh) { return simulate::scaled(mesh, {-1.0, 1.0, 1.0}); }
 
 // A scan of a part or its mirror image, and the part to be found in it.
-struct Scene {
-  explicit Scene(const TriangleMesh& standing_there) {
+struct MirrorScene {
+  explicit MirrorScene(const TriangleMesh& standing_there) {
     simulate::SimulateOptions options;
     options.scans = 1;
     options.points = 25000;
@@ -54,7 +54,7 @@ struct Scene {
 
 // The poses that put the part where its mirror image stands, as near to it as may be: mirrored at planes through the
 // middle of its box.
-std::vector<detect::Hypothesis> in_place_of_its_mirror_image(const Scene& scene) {
+std::vector<detect::Hypothesis> in_place_of_its_mirror_image(const MirrorScene& scene) {
   std::vector<detect::Hypothesis> poses;
   for (const Eigen::Vector3d& turn :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)}) {
@@ -69,7 +69,7 @@ std::vector<detect::Hypothesis> in_place_of_its_mirror_image(const Scene& scene)
 }
 
 TEST(MirrorImage, IsRejectedForThePart) {
-  const Scene scene(mirrored(test::stepped_block()));
+  const MirrorScene scene(mirrored(test::stepped_block()));
   std::vector<Detection> placements = scene.vouched_for(in_place_of_its_mirror_image(scene));
   ASSERT_EQ(placements.front().status, Status::accepted);
   ASSERT_FALSE(verify::is_beyond_doubt(placements.front(), {}));
@@ -84,7 +84,7 @@ TEST(MirrorImage, IsRejectedForThePart) {
 }
 
 TEST(MirrorImage, OfThePartExplainsNoMoreThanThePart) {
-  const Scene scene(test::stepped_block());
+  const MirrorScene scene(test::stepped_block());
   std::vector<Detection> placements = scene.vouched_for({{scene.standing_from_scan, 1.0}});
   ASSERT_EQ(placements.front().status, Status::accepted);
   placements.front().best.weakest_direction = 0.0;  // so that it is asked
@@ -95,7 +95,7 @@ TEST(MirrorImage, OfThePartExplainsNoMoreThanThePart) {
 
 // What stands elsewhere in the scan says nothing of the placement.
 TEST(MirrorImage, ElsewhereSaysNothing) {
-  const Scene scene(mirrored(test::stepped_block()));
+  const MirrorScene scene(mirrored(test::stepped_block()));
   std::vector<Detection> placements = scene.vouched_for(in_place_of_its_mirror_image(scene));
   placements.front().best.model_from_scan =
       Pose(Eigen::Translation3d(scene.model.diameter, 0, 0)) * placements.front().best.model_from_scan;
@@ -103,7 +103,7 @@ TEST(MirrorImage, ElsewhereSaysNothing) {
 }
 
 TEST(MirroredScan, TwiceIsTheScan) {
-  const Scene scene(test::stepped_block());
+  const MirrorScene scene(test::stepped_block());
   const scan::Scan once = scan::mirrored(scene.scan), twice = scan::mirrored(once);
   ASSERT_TRUE(scene.scan.spacing_by_range.known());
   for (std::size_t i = 0; i < scene.scan.cloud.size(); i += 100) {

@@ -27,7 +27,7 @@ TriangleMesh block() {
   return mesh;
 }
 
-constexpr double kNoise = 0.05;
+constexpr double kViewNoise = 0.05;
 
 // Samples 1.5 mm apart of the sides that look along `sides`: 1, 2, 3 for x, y, z, negative for the opposite.
 View view_of(std::initializer_list<int> sides, std::uint64_t seed) {
@@ -41,7 +41,7 @@ View view_of(std::initializer_list<int> sides, std::uint64_t seed) {
     for (double a = from_u - half[u]; a < half[u]; a += 1.5) {
       for (double b = from_v - half[v]; b < half[v]; b += 1.5) {
         Eigen::Vector3d point;
-        point[axis] = sign * half[axis] + kNoise * random.normal();
+        point[axis] = sign * half[axis] + kViewNoise * random.normal();
         point[u] = a;
         point[v] = b;
         view.segment_in_scan.positions.push_back(point.cast<float>());
@@ -49,7 +49,7 @@ View view_of(std::initializer_list<int> sides, std::uint64_t seed) {
       }
     }
   }
-  view.noise_sigma_mm = kNoise;
+  view.noise_sigma_mm = kViewNoise;
   return view;
 }
 
@@ -78,7 +78,7 @@ TEST(LooseViews, AreHeldAgainstTheModelWhereTheyDoNotHoldOneAnother) {
   const Refinement alone = refined(views, false, start), with = refined(views, true, start);
   EXPECT_FALSE(alone.firmly_held);
   EXPECT_GT(apart(alone), 1.0) << "nothing moved it";
-  EXPECT_LT(apart(with), kNoise);
+  EXPECT_LT(apart(with), kViewNoise);
   EXPECT_EQ(with.covariance.size(), 2U);
   EXPECT_LT(std::sqrt(with.covariance[1 - with.fixed_view](3, 3)), 0.2) << "and it is known to be there";
 }
@@ -91,7 +91,7 @@ TEST(LooseViews, AreNotAskedOfTheModelWhereTheyHoldOneAnother) {
   for (std::size_t v = 0; v < 2; ++v) {
     EXPECT_EQ(alone.model_from_scan[v].matrix(), with.model_from_scan[v].matrix()) << "to the bit";
   }
-  EXPECT_LT(apart(with), kNoise);
+  EXPECT_LT(apart(with), kViewNoise);
 }
 
 // The CAD is shorter than the part by 2 mm along x. Two views that hold one another do not care.
@@ -103,8 +103,8 @@ TEST(LooseViews, OfAPartThatDiffersFromItsModelAreHeldByOneAnotherFirst) {
   const std::vector<Link> links{{0, 1}};
   const Refinement result = refine_on_model(views, links, surface, diameter(shorter), {}, Context(2)).value();
   const Pose motion = result.model_from_scan[0].inverse() * result.model_from_scan[1];
-  EXPECT_NEAR(motion.translation().x(), 0.0, 2.0 * kNoise) << "held by what both see";
-  EXPECT_NEAR(motion.translation().z(), 0.0, 2.0 * kNoise);
+  EXPECT_NEAR(motion.translation().x(), 0.0, 2.0 * kViewNoise) << "held by what both see";
+  EXPECT_NEAR(motion.translation().z(), 0.0, 2.0 * kViewNoise);
 }
 
 // Four views that agree leave slides open between them; a fifth, which is corrugated, is none of this part.
@@ -151,12 +151,12 @@ View from_above(std::uint64_t seed) {
   Random random(seed, "step view", 0);
   for (double x = -50.0 + random.uniform(0.0, 1.0); x < 40.0; x += 1.0) {
     for (double y = -30.0 + random.uniform(0.0, 1.0); y < 30.0; y += 1.0) {
-      const double z = (x < 0.0 ? 30.0 : 0.0) + kNoise * random.normal();
+      const double z = (x < 0.0 ? 30.0 : 0.0) + kViewNoise * random.normal();
       view.segment_in_scan.positions.push_back(Eigen::Vector3d(x, y, z).cast<float>());
       view.segment_in_scan.normals.push_back(Eigen::Vector3f::UnitZ());
     }
   }
-  view.noise_sigma_mm = kNoise;
+  view.noise_sigma_mm = kViewNoise;
   view.viewpoint.kind = scan::Viewpoint::Kind::point;
   view.viewpoint.value = {0.0, 0.0, 2000.0};
   return view;

@@ -13,13 +13,13 @@ namespace asbuilt::refine {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kRadius = 50.0, kHeight = 40.0, kDiameter = 110.0, kSigma = 0.1;  // mm
+constexpr double kPartRadius = 50.0, kHeight = 40.0, kPartDiameter = 110.0, kSigma = 0.1;  // mm
 constexpr int kRibs = 10;
 constexpr double kPeriod = 2.0 * kPi / kRibs;
 
 // Ten ribs, 2.5 mm wide, around a drum.
 double rib(double angle, double height) {
-  const double from_middle = std::remainder(angle, kPeriod) * kRadius;
+  const double from_middle = std::remainder(angle, kPeriod) * kPartRadius;
   return height * std::clamp(2.0 - std::abs(from_middle), 0.0, 1.0);
 }
 
@@ -27,7 +27,7 @@ TriangleMesh drum(double rib_height) {
   TriangleMesh mesh;
   constexpr int kSides = 1200;
   for (int i = 0; i < kSides; ++i) {
-    const double angle = 2.0 * kPi * i / kSides, radius = kRadius + rib(angle, rib_height);
+    const double angle = 2.0 * kPi * i / kSides, radius = kPartRadius + rib(angle, rib_height);
     for (const double z : {0.0, kHeight})
       mesh.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
   }
@@ -47,7 +47,7 @@ View view_of(double rib_height, std::uint64_t seed) {
   for (int i = 0; i < 12000; ++i) {
     const double angle = random.uniform(-1.2, 1.2);
     const double warp = 3.0 * kSigma * std::cos(2.0 * angle + static_cast<double>(seed));
-    const double radius = kRadius + rib(angle, rib_height) + warp + kSigma * random.normal();
+    const double radius = kPartRadius + rib(angle, rib_height) + warp + kSigma * random.normal();
     const Eigen::Vector3d outwards(std::cos(angle), std::sin(angle), 0.0);
     view.segment_in_scan.positions.push_back(
         (radius * outwards + random.uniform(0.0, kHeight) * Eigen::Vector3d::UnitZ()).cast<float>());
@@ -65,9 +65,10 @@ TEST(TurnOnModel, LowRibsTellIt) {
     View view = view_of(0.55, seed);
     const double off = 0.09 * static_cast<double>(seed) + 0.02;  // seed 3: nearly half-way between two ribs
     view.model_from_scan = Pose(Eigen::AngleAxisd(off, Eigen::Vector3d::UnitZ()));
-    const ModelTurn turn = turn_on_model(view, surface, kDiameter, kAxis, Context(2)).value();
+    const ModelTurn turn = turn_on_model(view, surface, kPartDiameter, kAxis, Context(2)).value();
     EXPECT_TRUE(turn.is_told) << "seed " << seed;
-    EXPECT_LT(std::abs(std::remainder(off + turn.angle_rad, kPeriod)) * kRadius, 0.003 * kDiameter) << "seed " << seed;
+    EXPECT_LT(std::abs(std::remainder(off + turn.angle_rad, kPeriod)) * kPartRadius, 0.003 * kPartDiameter)
+        << "seed " << seed;
   }
 }
 
@@ -75,7 +76,7 @@ TEST(TurnOnModel, NothingTellsTheTurnsOfARoundPartApart) {
   const TriangleMesh mesh = drum(0.0);
   const model::SurfaceDistance surface(mesh);
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
-    EXPECT_FALSE(turn_on_model(view_of(0.0, seed), surface, kDiameter, kAxis, Context(2)).value().is_told);
+    EXPECT_FALSE(turn_on_model(view_of(0.0, seed), surface, kPartDiameter, kAxis, Context(2)).value().is_told);
   }
 }
 
@@ -85,9 +86,9 @@ TEST(TurnOnModel, RibsThatNoiseHidesTellNothingWrong) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     View view = view_of(0.05, seed);
     view.model_from_scan = Pose(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()));
-    const ModelTurn turn = turn_on_model(view, surface, kDiameter, kAxis, Context(2)).value();
-    const double off_mm = std::abs(std::remainder(0.3 + turn.angle_rad, kPeriod)) * kRadius;
-    EXPECT_TRUE(!turn.is_told || off_mm < 0.01 * kDiameter) << "seed " << seed;
+    const ModelTurn turn = turn_on_model(view, surface, kPartDiameter, kAxis, Context(2)).value();
+    const double off_mm = std::abs(std::remainder(0.3 + turn.angle_rad, kPeriod)) * kPartRadius;
+    EXPECT_TRUE(!turn.is_told || off_mm < 0.01 * kPartDiameter) << "seed " << seed;
   }
 }
 
@@ -95,15 +96,15 @@ TEST(TurnOnModel, IsTheSameForAnyNumberOfThreadsAndRefusesWhatIsNone) {
   const TriangleMesh mesh = drum(0.55);
   const model::SurfaceDistance surface(mesh);
   View view = view_of(0.55, 1);
-  const ModelTurn one = turn_on_model(view, surface, kDiameter, kAxis, Context(1)).value();
-  const ModelTurn eight = turn_on_model(view, surface, kDiameter, kAxis, Context(8)).value();
+  const ModelTurn one = turn_on_model(view, surface, kPartDiameter, kAxis, Context(1)).value();
+  const ModelTurn eight = turn_on_model(view, surface, kPartDiameter, kAxis, Context(8)).value();
   EXPECT_EQ(one.angle_rad, eight.angle_rad);
   EXPECT_EQ(one.is_told, eight.is_told);
-  EXPECT_FALSE(turn_on_model(View{}, surface, kDiameter, kAxis, Context(1)).value().is_told);
+  EXPECT_FALSE(turn_on_model(View{}, surface, kPartDiameter, kAxis, Context(1)).value().is_told);
   EXPECT_FALSE(turn_on_model(view, surface, 0.0, kAxis, Context(1)));
-  EXPECT_FALSE(turn_on_model(view, surface, kDiameter, TurnAxis{}, Context(1)));
+  EXPECT_FALSE(turn_on_model(view, surface, kPartDiameter, TurnAxis{}, Context(1)));
   view.segment_in_scan.normals.pop_back();
-  EXPECT_EQ(turn_on_model(view, surface, kDiameter, kAxis, Context(1)).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(turn_on_model(view, surface, kPartDiameter, kAxis, Context(1)).error().code, ErrorCode::invalid_argument);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 /// simulator.
 namespace asbuilt::test {
 
+inline const Eigen::Vector3d kCamera(-40, 30, 0);
 inline const Eigen::Vector3d kBall(20, 10, 600);  // mm; the camera looks along +z
 inline constexpr double kBallRadius = 90.0, kWall = 900.0, kFloor = -160.0;
 

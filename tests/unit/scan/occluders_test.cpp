@@ -19,9 +19,9 @@ constexpr double kHalf = 100.0, kDepth = 1000.0, kBarHalf = 10.0, kBarDepth = 70
 
 Plate plate_behind_a_bar(const Viewpoint& viewpoint) {
   Plate result;
-  constexpr double kStep = 0.002;  // 2 mm on the plate
-  for (double u = -0.2; u < 0.2; u += kStep) {
-    for (double v = -0.2; v < 0.2; v += kStep) {
+  constexpr double kPlateStep = 0.002;  // 2 mm on the plate
+  for (double u = -0.2; u < 0.2; u += kPlateStep) {
+    for (double v = -0.2; v < 0.2; v += kPlateStep) {
       const bool on_bar = std::abs(u * kBarDepth) < kBarHalf;
       const bool on_plate = !on_bar && std::abs(u * kDepth) < kHalf && std::abs(v * kDepth) < kHalf;
       const double depth = on_bar ? kBarDepth : on_plate ? kDepth : 2000.0;

@@ -10,7 +10,7 @@
 namespace asbuilt::scan {
 namespace {
 
-Viewpoint at(double x, double y, double z) { return {Viewpoint::Kind::point, {x, y, z}}; }
+Viewpoint viewpoint_at(double x, double y, double z) { return {Viewpoint::Kind::point, {x, y, z}}; }
 
 // A ball before a wall as a sensor at the origin sees them: the cap that faces it, and the wall outside the shadow.
 PointCloud ball_before_wall() {
@@ -29,16 +29,16 @@ PointCloud ball_before_wall() {
 }
 
 TEST(Viewpoint, TowardsTheSensorIsAUnitVector) {
-  EXPECT_EQ(at(0, 0, 10).towards_sensor({0, 0, 4}), Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(viewpoint_at(0, 0, 10).towards_sensor({0, 0, 4}), Eigen::Vector3d(0, 0, 1));
   EXPECT_EQ((Viewpoint{Viewpoint::Kind::direction, {0, 1, 0}}.towards_sensor({5, 5, 5})), Eigen::Vector3d(0, -1, 0));
   EXPECT_EQ(Viewpoint{}.towards_sensor({1, 2, 3}), Eigen::Vector3d::Zero());
 }
 
 TEST(HiddenShare, IsSmallFromWhereTheScanWasTakenAndLargeFromTheSide) {
   const PointCloud cloud = ball_before_wall();
-  EXPECT_LT(hidden_share(cloud.positions, 2.0, at(0, 0, 0)), 0.02);
+  EXPECT_LT(hidden_share(cloud.positions, 2.0, viewpoint_at(0, 0, 0)), 0.02);
   // From the side the ball stands before points that it did not hide from the origin.
-  EXPECT_GT(hidden_share(cloud.positions, 2.0, at(280, 0, 120)), 0.03);
+  EXPECT_GT(hidden_share(cloud.positions, 2.0, viewpoint_at(280, 0, 120)), 0.03);
 }
 
 TEST(HiddenShare, CountsTheHiddenHalfOfTwoSheets) {
@@ -57,20 +57,20 @@ TEST(DepthOrder, SignedNormalsThatLookAwayRuleAViewpointOut) {
   const PointCloud cloud = test::plane_cloud(100.0, 1.0, 200.0, 0.0, 1);
   const std::vector<Eigen::Vector3f> fitted(cloud.size(), Eigen::Vector3f(0, 0, 1));
   const std::vector<Eigen::Vector3f> towards(cloud.size(), Eigen::Vector3f(0, 0, -1));
-  EXPECT_TRUE(agrees_with_depth_order(cloud.positions, fitted, {}, 1.0, at(0, 0, 0)));
-  EXPECT_TRUE(agrees_with_depth_order(cloud.positions, fitted, towards, 1.0, at(0, 0, 0)));
-  EXPECT_FALSE(agrees_with_depth_order(cloud.positions, fitted, fitted, 1.0, at(0, 0, 0)));
+  EXPECT_TRUE(agrees_with_depth_order(cloud.positions, fitted, {}, 1.0, viewpoint_at(0, 0, 0)));
+  EXPECT_TRUE(agrees_with_depth_order(cloud.positions, fitted, towards, 1.0, viewpoint_at(0, 0, 0)));
+  EXPECT_FALSE(agrees_with_depth_order(cloud.positions, fitted, fitted, 1.0, viewpoint_at(0, 0, 0)));
 }
 
 TEST(DepthOrder, SurfacesSeenEdgeOnRuleAViewpointOut) {
   const PointCloud cloud = test::plane_cloud(100.0, 1.0, 200.0, 0.0, 1);
   const std::vector<Eigen::Vector3f> fitted(cloud.size(), Eigen::Vector3f(0, 0, 1));
-  EXPECT_FALSE(agrees_with_depth_order(cloud.positions, fitted, {}, 1.0, at(1000, 0, 205)));
+  EXPECT_FALSE(agrees_with_depth_order(cloud.positions, fitted, {}, 1.0, viewpoint_at(1000, 0, 205)));
 }
 
 TEST(DepthOrder, HasNoAnswerWithoutPointsOrViewpoint) {
   const PointCloud cloud = test::plane_cloud(100.0, 1.0, 200.0, 0.0, 1);
-  EXPECT_FALSE(agrees_with_depth_order({}, {}, {}, 1.0, at(0, 0, 0)));
+  EXPECT_FALSE(agrees_with_depth_order({}, {}, {}, 1.0, viewpoint_at(0, 0, 0)));
   EXPECT_FALSE(agrees_with_depth_order(cloud.positions, cloud.positions, {}, 1.0, Viewpoint{}));
 }
 

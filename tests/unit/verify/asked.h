@@ -7,9 +7,13 @@
 #include <vector>
 
 #include "asbuilt/verify/evidence.h"
+#include "asbuilt/verify/verify.h"
 #include "unit/verify/seen.h"
 
 namespace asbuilt::test {
+
+inline const Eigen::Vector3d kBrick(100, 80, 60);  // mm
+inline const verify::VerifyOptions kLimits;
 
 /// A scene that was seen from the origin, asked about a part at a pose.
 struct Asked {

@@ -28,18 +28,17 @@ PoseContrast asked(const scan::Scan& scan, const Pose& first, const Pose& second
 }
 
 TriangleMesh part() { return simulate::transformed(test::notched_plate(26.0), kScanFromModel); }
-TriangleMesh wall() { return test::plate_at({2000, 2000, 10}, {0, 0, 1000}); }
 
 // Two places of 14 x 24 mm, where one pose has the deep notch and the other has not.
 TEST(Contrast, SpeaksForTheTruePoseWhereTheOtherPutsItsNotch) {
-  const scan::Scan scan = test::seen({part(), wall()});
+  const scan::Scan scan = test::seen({part(), test::wall()});
   const PoseContrast result = asked(scan, kScanFromModel.inverse(), quarter_turned());
   EXPECT_GT(result.for_first, 20.0);
   EXPECT_LT(result.for_second, 0.05 * result.for_first);
 }
 
 TEST(Contrast, DoesNotDependOnTheOrder) {
-  const scan::Scan scan = test::seen({part(), wall()});
+  const scan::Scan scan = test::seen({part(), test::wall()});
   const PoseContrast there = asked(scan, kScanFromModel.inverse(), quarter_turned());
   const PoseContrast back = asked(scan, quarter_turned(), kScanFromModel.inverse());
   EXPECT_EQ(there.for_first, back.for_second);
@@ -48,7 +47,7 @@ TEST(Contrast, DoesNotDependOnTheOrder) {
 
 // Whoever comes first is asked by a search, and the other is spared searches by what they told.
 TEST(Contrast, OfManyRivalsIsThatOfEachAlone) {
-  scan::Scan scan = test::seen({part(), wall()});
+  scan::Scan scan = test::seen({part(), test::wall()});
   for (const bool has_viewpoint : {true, false}) {
     if (!has_viewpoint) scan.viewpoint = {};
     const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
@@ -72,7 +71,7 @@ TEST(Contrast, OfManyRivalsIsThatOfEachAlone) {
 }
 
 TEST(Contrast, OfAPoseWithItselfIsNothing) {
-  const scan::Scan scan = test::seen({part(), wall()});
+  const scan::Scan scan = test::seen({part(), test::wall()});
   EXPECT_EQ(asked(scan, kScanFromModel.inverse(), kScanFromModel.inverse()).total(), 0.0);
 }
 
@@ -82,7 +81,7 @@ TEST(Contrast, IsNothingWhereBothPlacesAreHidden) {
   const TriangleMesh above = test::plate_at({800, 400, 2}, {0, 200 + 15 * 400.0 / 600.0, 410});
   const TriangleMesh left = test::plate_at({400, 800, 2}, {-200 - 15 * 400.0 / 600.0, 0, 420});
   const TriangleMesh below = test::plate_at({800, 400, 2}, {0, -200 - 15 * 400.0 / 600.0, 430});
-  const scan::Scan scan = test::seen({part(), right, above, left, below, wall()});
+  const scan::Scan scan = test::seen({part(), right, above, left, below, test::wall()});
   EXPECT_LT(asked(scan, kScanFromModel.inverse(), quarter_turned()).total(), 1.0);
 }
 

@@ -27,11 +27,10 @@ PoseEvidence judged(const scan::Scan& scan, const Pose& scan_from_model, const m
 TriangleMesh part_at(const Pose& scan_from_model) {
   return simulate::transformed(test::stepped_block(), scan_from_model);
 }
-TriangleMesh wall() { return test::plate_at({2000, 2000, 10}, {0, 0, 1000}); }
 
 TEST(Evidence, OfTheTruePoseIsAllForIt) {
   const Pose pose = test::pose_at(kPlace);
-  const PoseEvidence evidence = judged(test::seen({part_at(pose), wall()}), pose);
+  const PoseEvidence evidence = judged(test::seen({part_at(pose), test::wall()}), pose);
   EXPECT_GT(evidence.score(), 0.97);
   EXPECT_LT(evidence.free_space_share(), 0.005);
   EXPECT_LT(evidence.contradicted, 0.01 * evidence.facing);
@@ -54,7 +53,7 @@ TEST(Evidence, GapsBetweenRaysDenyNothing) {
   const Eigen::Vector3d tilt(1.28, 0, 0);  // 73 degrees
   const Pose pose = test::pose_at(kPlace, tilt);
   static const model::PreparedModel plate = test::prepared(simulate::box({200, 200, 5}), 0.03);
-  scan::Scan dense = test::seen({simulate::transformed(simulate::box({200, 200, 5}), pose), wall()}, 0.25, 0.002);
+  scan::Scan dense = test::seen({simulate::transformed(simulate::box({200, 200, 5}), pose), test::wall()}, 0.25, 0.002);
   PointCloud rows;  // every second row of rays
   for (const Eigen::Vector3f& point : dense.cloud.positions) {
     const auto row = std::lround((static_cast<double>(point.y() / point.z()) - 2e-5 + 0.25) / 0.002);
@@ -71,7 +70,7 @@ TEST(Evidence, GapsBetweenRaysDenyNothing) {
 
 TEST(Evidence, EverySampleThatOughtToBeSeenIsOfOneKind) {
   const Pose pose = test::pose_at(kPlace), claimed = test::pose_at(kPlace + Eigen::Vector3d(30, 10, 5));
-  const PoseEvidence e = judged(test::seen({part_at(pose), wall()}), claimed);
+  const PoseEvidence e = judged(test::seen({part_at(pose), test::wall()}), claimed);
   EXPECT_NEAR(e.explained + e.hidden + e.contradicted + e.seen_through + e.missing, e.facing, 1e-9 * e.facing);
   EXPECT_GE(e.explained_anywhere, e.explained_samples);
 }
@@ -81,8 +80,8 @@ TEST(Evidence, HiddenIsNeutral) {
   // A plate at two thirds of the way that covers everything to the right of the part's middle.
   const Eigen::Vector3d middle = pose * Eigen::Vector3d(bounding_box(block().skin).center());
   const TriangleMesh plate = test::plate_at({400, 400, 5}, {200.0 + middle.x() * 400.0 / middle.z(), 0, 400});
-  const PoseEvidence open = judged(test::seen({part_at(pose), wall()}), pose);
-  const PoseEvidence covered = judged(test::seen({part_at(pose), wall(), plate}), pose);
+  const PoseEvidence open = judged(test::seen({part_at(pose), test::wall()}), pose);
+  const PoseEvidence covered = judged(test::seen({part_at(pose), test::wall(), plate}), pose);
   EXPECT_GT(covered.hidden, 0.3 * covered.facing);
   EXPECT_LT(covered.hidden, 0.7 * covered.facing);
   EXPECT_NEAR(covered.score(), open.score(), 0.03);
@@ -92,7 +91,7 @@ TEST(Evidence, HiddenIsNeutral) {
 
 TEST(Evidence, SeenThroughCountsAgainst) {
   const Pose pose = test::pose_at(kPlace);
-  const PoseEvidence evidence = judged(test::seen({wall()}), pose);  // the part is not there at all
+  const PoseEvidence evidence = judged(test::seen({test::wall()}), pose);  // the part is not there at all
   EXPECT_GT(evidence.free_space_share(), 0.97);
   EXPECT_LT(evidence.score(), 0.01);
 }
@@ -103,7 +102,7 @@ TEST(Evidence, NoReturnIsWeakerThanSeenThrough) {
   const PoseEvidence nothing = judged(
       test::seen({test::plate_at({60, 60, 5}, {-160, -160, 800}), test::plate_at({60, 60, 5}, {160, 160, 800})}), pose);
   EXPECT_GT(nothing.missing, 0.95 * nothing.facing);
-  const PoseEvidence through = judged(test::seen({wall()}), pose);
+  const PoseEvidence through = judged(test::seen({test::wall()}), pose);
   EXPECT_GT(through.seen_through, 0.95 * through.facing);
   PoseEvidence half_missing, half_seen_through;
   half_missing.explained = half_seen_through.explained = 1.0;
@@ -113,7 +112,7 @@ TEST(Evidence, NoReturnIsWeakerThanSeenThrough) {
 
 TEST(Evidence, WhereTheCameraDidNotLookIsNeutral) {
   const Pose pose = test::pose_at(kPlace);
-  const std::vector<TriangleMesh> things{part_at(pose), wall()};
+  const std::vector<TriangleMesh> things{part_at(pose), test::wall()};
   const PoseEvidence whole = judged(test::seen(things), pose);
   const PoseEvidence close_up = judged(test::seen(things, 0.04, 0.0005), pose);  // cuts off most of the part
   EXPECT_LT(close_up.explained, 0.6 * whole.explained);
@@ -125,13 +124,13 @@ TEST(Evidence, WhereTheCameraDidNotLookIsNeutral) {
 TEST(Evidence, ASurfaceElsewhereContradicts) {
   const Pose pose = test::pose_at(kPlace);
   const Pose nearer = test::pose_at(kPlace - Eigen::Vector3d(0, 0, 1.8));  // between distance and lateral tolerance
-  const PoseEvidence evidence = judged(test::seen({part_at(pose), wall()}), nearer);
+  const PoseEvidence evidence = judged(test::seen({part_at(pose), test::wall()}), nearer);
   EXPECT_GT(evidence.contradicted, 0.5 * evidence.facing);
 }
 
 TEST(Evidence, BackgroundNeverConfirms) {
   const Pose pose = test::pose_at(kPlace);
-  const scan::Scan scan = test::seen({part_at(pose), wall()});
+  const scan::Scan scan = test::seen({part_at(pose), test::wall()});
   // All but one point: a kd-tree of none is not asked here.
   std::vector<std::uint8_t> background(scan.cloud.size(), 1);
   background.front() = 0;
@@ -240,7 +239,8 @@ TEST(ShareSeenFromBehind, TellsTheFrontOfAFaceByWhatStandsBehindIt) {
 }
 
 TEST(ShareSeenFromBehind, IsNoneIfTheSensorMayHaveStoodBeforeWhatIsBehind) {
-  const auto [right, from_behind] = seen_from_behind_at({100, 100, 60}, {150, 0, 500}, wall());  // 3.4 diameters away
+  const auto [right, from_behind] =
+      seen_from_behind_at({100, 100, 60}, {150, 0, 500}, test::wall());  // 3.4 diameters away
   EXPECT_LT(right, 0.01);
   EXPECT_EQ(from_behind, 0.0);
 }

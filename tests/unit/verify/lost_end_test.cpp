@@ -11,8 +11,7 @@
 namespace asbuilt::verify {
 namespace {
 
-const Eigen::Vector3d kBrick(100, 80, 60), kShorter(100, 80, 40);
-const VerifyOptions kLimits;
+const Eigen::Vector3d kShorter(100, 80, 40);
 
 // Small things in the corners of the picture: what lies between them and the box was looked at.
 std::vector<TriangleMesh> with_corners(std::vector<TriangleMesh> others) {
@@ -23,33 +22,36 @@ std::vector<TriangleMesh> with_corners(std::vector<TriangleMesh> others) {
 }
 
 /// A box in a scan, looked at from its corner, asked as a box of `believed` edges whose corner lies there.
-struct Believed : test::Asked {
-  Believed(const Eigen::Vector3d& built, const Eigen::Vector3d& believed, const std::vector<TriangleMesh>& others)
+struct BelievedWhole : test::Asked {
+  BelievedWhole(const Eigen::Vector3d& built, const Eigen::Vector3d& believed, const std::vector<TriangleMesh>& others)
       : test::Asked(test::prepared(simulate::box(believed)),
                     (test::corner_ahead(500) * Eigen::Translation3d(0.5 * (built - believed))).inverse(),
                     test::with(with_corners(others), simulate::box(built), test::corner_ahead(500)), 0.25) {}
   [[nodiscard]] double lost() const { return lost_end_share(model_from_scan, model, *seen_by, options); }
 };
 
-TEST(LostEnd, IsNoneWhereTheWholeBoxCameBack) { EXPECT_LT(Believed(kBrick, kBrick, {}).lost(), 0.005); }
+TEST(LostEnd, IsNoneWhereTheWholeBoxCameBack) {
+  EXPECT_LT(BelievedWhole(test::kBrick, test::kBrick, {}).lost(), 0.005);
+}
 
 // Where the brick goes on and the shorter box does not, nothing comes back: the lower third of two of three faces. From
 // straight ahead of the corner every face is looked at alike. What lies within a few measurements of the built edge, a
 // quarter of the third, cannot be told from it.
 TEST(LostEnd, IsTheShareOfWhatAShorterBoxLeavesOut) {
-  const double all = kBrick.x() * kBrick.y() + kBrick.y() * kBrick.z() + kBrick.z() * kBrick.x();
-  const double left_out = (kBrick.x() + kBrick.y()) * (kBrick.z() - kShorter.z());
-  const double lost = Believed(kShorter, kBrick, {}).lost();
+  const double all =
+      test::kBrick.x() * test::kBrick.y() + test::kBrick.y() * test::kBrick.z() + test::kBrick.z() * test::kBrick.x();
+  const double left_out = (test::kBrick.x() + test::kBrick.y()) * (test::kBrick.z() - kShorter.z());
+  const double lost = BelievedWhole(kShorter, test::kBrick, {}).lost();
   EXPECT_LT(lost, left_out / all);
   EXPECT_GT(lost, 0.5 * left_out / all);
-  EXPECT_GT(lost, 2.0 * kLimits.max_lost_end_share);
+  EXPECT_GT(lost, 2.0 * test::kLimits.max_lost_end_share);
 }
 
 TEST(LostEnd, IsNoneWhereSomethingBehindIsSeen) {
   const std::vector<TriangleMesh> wall{test::plate_at({2000, 2000, 10}, {0, 0, 900})};
-  const Believed wrong(kShorter, kBrick, wall);
+  const BelievedWhole wrong(kShorter, test::kBrick, wall);
   EXPECT_LT(wrong.lost(), 0.01);
-  EXPECT_GT(wrong.evidence.free_space_share(), kLimits.max_free_space_share) << "what tells instead";
+  EXPECT_GT(wrong.evidence.free_space_share(), test::kLimits.max_free_space_share) << "what tells instead";
 }
 
 // Where the half of a ball that is in sight goes missing below, the rest tells its size.

@@ -21,21 +21,21 @@ const model::PreparedModel& brick() {
   return model;
 }
 
-const Pose kScanFromModel = test::corner_ahead(500);
+const Pose kScanFromBox = test::corner_ahead(500);
 
 std::vector<RimProbe> probes() { return rim_probes(brick(), kReach, 3000); }
 
 RimEvidence asked(const std::vector<TriangleMesh>& meshes_in_scan) {
   const scan::Scan scan = test::seen(meshes_in_scan);
   const ScanEvidence evidence(scan, std::vector<std::uint8_t>(scan.cloud.size(), 0));
-  return rim_evidence(kScanFromModel.inverse(), probes(), kReach, evidence,
+  return rim_evidence(kScanFromBox.inverse(), probes(), kReach, evidence,
                       {kDistance, std::max(kDistance, 2.5 * scan.spacing_mm)});
 }
 
 /// A larger box that shares the corner ahead.
 TriangleMesh larger(double factor) {
   const Pose about_corner(Eigen::Translation3d((1.0 - factor) * 0.5 * kSize));
-  return simulate::transformed(simulate::box(factor * kSize), kScanFromModel * about_corner);
+  return simulate::transformed(simulate::box(factor * kSize), kScanFromBox * about_corner);
 }
 
 TEST(Rim, ProbesLieInThePlaneOfAFaceAndPastItsEdge) {
@@ -56,7 +56,7 @@ TEST(Rim, ProbesLieInThePlaneOfAFaceAndPastItsEdge) {
 }
 
 TEST(Rim, OfThePartItselfIsNowhereOverrun) {
-  const RimEvidence evidence = asked({simulate::transformed(simulate::box(kSize), kScanFromModel)});
+  const RimEvidence evidence = asked({simulate::transformed(simulate::box(kSize), kScanFromBox)});
   EXPECT_GT(evidence.asked, 50U);
   EXPECT_EQ(evidence.overrun, 0U);
   EXPECT_EQ(evidence.overrun_share(), 0.0);
@@ -133,7 +133,7 @@ TEST(Rim, RoundedEdgesHaveOneToo) {
 
 TEST(Rim, HiddenPlacesAreNotAsked) {
   const TriangleMesh screen = test::plate_at({2000, 2000, 2}, {0, 0, 200});
-  const RimEvidence evidence = asked({simulate::transformed(simulate::box(kSize), kScanFromModel), screen});
+  const RimEvidence evidence = asked({simulate::transformed(simulate::box(kSize), kScanFromBox), screen});
   EXPECT_EQ(evidence.asked, 0U);
   EXPECT_EQ(evidence.overrun_share(), 0.0);
 }

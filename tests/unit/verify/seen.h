@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <vector>
 
 #include "asbuilt/model/prepared_model.h"
@@ -38,7 +39,8 @@ inline Pose pose_at(const Eigen::Vector3d& where, const Eigen::Vector3d& turn = 
 
 /// A box's corner (+, +, +) straight ahead, so that three of its faces are seen.
 inline Pose corner_ahead(double distance_mm) {
-  Pose pose(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::Ones(), -Eigen::Vector3d::UnitZ()));
+  const Eigen::Vector3d diagonal = Eigen::Vector3d::Ones().normalized(), towards_sensor = -Eigen::Vector3d::UnitZ();
+  Pose pose(Eigen::AngleAxisd(std::acos(diagonal.dot(towards_sensor)), diagonal.cross(towards_sensor).normalized()));
   pose.translation() = Eigen::Vector3d(0, 0, distance_mm);
   return pose;
 }
@@ -46,6 +48,9 @@ inline Pose corner_ahead(double distance_mm) {
 inline TriangleMesh plate_at(const Eigen::Vector3d& size, const Eigen::Vector3d& where) {
   return simulate::transformed(simulate::box(size), Pose(Eigen::Translation3d(where)));
 }
+
+/// Far behind the parts, wider than what is seen.
+inline TriangleMesh wall() { return plate_at({2000, 2000, 10}, {0, 0, 1000}); }
 
 inline model::PreparedModel prepared(const TriangleMesh& mesh, double ratio = 0.0) {
   model::ModelOptions options;

@@ -14,9 +14,6 @@
 namespace asbuilt::verify {
 namespace {
 
-const Eigen::Vector3d kBrick(100, 80, 60);
-const VerifyOptions kLimits;
-
 // What evidence_for() sums up, of every sample whose normal has a positive product with `side`, or of all.
 PoseEvidence all_found(const model::PreparedModel& model, const std::optional<Eigen::Vector3d>& side) {
   PoseEvidence evidence;
@@ -38,10 +35,10 @@ PoseEvidence all_found(const model::PreparedModel& model, const std::optional<Ei
 // A box that grows about its centre by the growth of its half diameter h leaves face i, half of its edge e_i away, by
 // e_i / 2 / h; on all six faces no motion makes up for it.
 TEST(SizeHold, OfAWholeBoxIsTheMeanSquareOfTheWayOfItsFaces) {
-  const model::PreparedModel brick = test::prepared(simulate::box(kBrick));
+  const model::PreparedModel brick = test::prepared(simulate::box(test::kBrick));
   double areas = 0.0, sum = 0.0;
   for (int i = 0; i < 3; ++i) {
-    const double area = kBrick.prod() / kBrick[i], way = kBrick[i] / kBrick.norm();
+    const double area = test::kBrick.prod() / test::kBrick[i], way = test::kBrick[i] / test::kBrick.norm();
     areas += area;
     sum += area * way * way;
   }
@@ -49,14 +46,14 @@ TEST(SizeHold, OfAWholeBoxIsTheMeanSquareOfTheWayOfItsFaces) {
 }
 
 TEST(SizeHold, IsNoneOnThreeFacesAtACorner) {
-  const model::PreparedModel brick = test::prepared(simulate::box(kBrick));
-  EXPECT_LT(size_hold(all_found(brick, Eigen::Vector3d(1, 1, 1))), 0.01 * kLimits.min_weakest_direction);
+  const model::PreparedModel brick = test::prepared(simulate::box(test::kBrick));
+  EXPECT_LT(size_hold(all_found(brick, Eigen::Vector3d(1, 1, 1))), 0.01 * test::kLimits.min_weakest_direction);
 }
 
 TEST(SizeHold, OfASphereIsThatOfItsRadiusAsFarAsItIsSeen) {
   const model::PreparedModel ball = test::prepared(simulate::sphere(40.0, 4));
   const PoseEvidence half = all_found(ball, Eigen::Vector3d(0, 0, 1));
-  EXPECT_GT(size_hold(half), 2.0 * kLimits.min_weakest_direction);
+  EXPECT_GT(size_hold(half), 2.0 * test::kLimits.min_weakest_direction);
   EXPECT_LT(size_hold(half), size_hold(all_found(ball, std::nullopt)));
 }
 
@@ -70,18 +67,18 @@ struct Believed : test::Asked {
 };
 
 TEST(SizeLead, TellsABoxFromLargerAndSmallerOnesWhereItsEdgesAreSeen) {
-  const Believed right(kBrick, kBrick, {});
-  EXPECT_LT(size_hold(right.evidence), kLimits.min_weakest_direction);
-  EXPECT_GT(right.lead(), 3.0 * kLimits.min_contrast);
+  const Believed right(test::kBrick, test::kBrick, {});
+  EXPECT_LT(size_hold(right.evidence), test::kLimits.min_weakest_direction);
+  EXPECT_GT(right.lead(), 3.0 * test::kLimits.min_contrast);
   // A model a tenth too small or too large loses to the box that is there.
-  EXPECT_LT(Believed(kBrick, kBrick / 1.1, {}).lead(), 0.0);
-  EXPECT_LT(Believed(kBrick, kBrick / 0.9, {}).lead(), 0.0);
+  EXPECT_LT(Believed(test::kBrick, test::kBrick / 1.1, {}).lead(), 0.0);
+  EXPECT_LT(Believed(test::kBrick, test::kBrick / 0.9, {}).lead(), 0.0);
 }
 
 // The corner that is seen lies right, and the far edges are but a twentieth off.
 TEST(SizeLead, TellsABoxFromOneALittleSmaller) {
-  EXPECT_LT(Believed(0.95 * kBrick, kBrick, {}).lead(), 0.0);
-  EXPECT_LT(Believed(1.05 * kBrick, kBrick, {}).lead(), 0.0);
+  EXPECT_LT(Believed(0.95 * test::kBrick, test::kBrick, {}).lead(), 0.0);
+  EXPECT_LT(Believed(1.05 * test::kBrick, test::kBrick, {}).lead(), 0.0);
 }
 
 // A screen before the box with a window in which its nearest corner is seen, but no other.
@@ -89,10 +86,10 @@ TEST(SizeLead, IsNoneWhereTheFarEdgesAreHidden) {
   const std::vector<TriangleMesh> screen{
       test::plate_at({200, 400, 1}, {-110, 0, 300}), test::plate_at({200, 400, 1}, {110, 0, 300}),
       test::plate_at({20, 190, 1}, {0, -105, 300}), test::plate_at({20, 190, 1}, {0, 105, 300})};
-  const Believed right(kBrick, kBrick, screen);
+  const Believed right(test::kBrick, test::kBrick, screen);
   EXPECT_GT(right.evidence.explained_samples, 100U);
-  EXPECT_LT(size_hold(right.evidence), kLimits.min_weakest_direction);
-  EXPECT_LT(right.lead(), kLimits.min_contrast);
+  EXPECT_LT(size_hold(right.evidence), test::kLimits.min_weakest_direction);
+  EXPECT_LT(right.lead(), test::kLimits.min_contrast);
 }
 
 // Of the rounded side of a can, a part is in sight, and of its upper rim: a can a third larger, laid onto them, loses.
@@ -106,12 +103,12 @@ TEST(SizeLead, TellsARoundPartFromWhatIsMuchSmaller) {
                                           test::plate_at({200, 400, 1}, {-100 - 12, 0, 410})};
   const test::Asked wrong(test::prepared(simulate::cylinder(60.0, 200.0)), upright(60.0, 200.0).inverse(),
                           test::with(screens, simulate::cylinder(45.0, 150.0), upright(45.0, 150.0)), 0.25);
-  EXPECT_LT(size_hold(wrong.evidence), kLimits.min_weakest_direction);
+  EXPECT_LT(size_hold(wrong.evidence), test::kLimits.min_weakest_direction);
   EXPECT_LT(size_lead(wrong.model_from_scan, wrong.evidence, wrong.model, *wrong.seen_by, wrong.options), 0.0);
   const test::Asked right(test::prepared(simulate::cylinder(60.0, 200.0)), upright(60.0, 200.0).inverse(),
                           test::with(screens, simulate::cylinder(60.0, 200.0), upright(60.0, 200.0)), 0.25);
   EXPECT_GT(size_lead(right.model_from_scan, right.evidence, right.model, *right.seen_by, right.options),
-            kLimits.min_contrast);
+            test::kLimits.min_contrast);
 }
 
 TEST(SizedPose, KeepsItsFixedPointAndScalesAllDistancesFromIt) {

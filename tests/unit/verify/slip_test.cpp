@@ -31,14 +31,11 @@ struct Asked : test::Asked {
   [[nodiscard]] double weakest() const { return weakest_direction(evidence, model, false); }
 };
 
-const Eigen::Vector3d kBrick(100, 80, 60);
-const VerifyOptions kLimits;
-
 constexpr double kEveryDirection = std::numeric_limits<double>::infinity();
 
 // Where a box moves most is a corner; the samples that are asked lie next to it.
 TEST(Slip, PosesMoveTheSurfaceByTheGivenWayBothWays) {
-  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
+  const Asked brick(simulate::box(test::kBrick), test::corner_ahead(500), {}, 0.25);
   const auto slipped =
       slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kEveryDirection, 4.0, Slips::single);
   ASSERT_EQ(slipped.size(), 6U);
@@ -49,26 +46,26 @@ TEST(Slip, PosesMoveTheSurfaceByTheGivenWayBothWays) {
 }
 
 TEST(Slip, ABoxThatShowsThreeFacesIsHeldByThem) {
-  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
-  EXPECT_GT(brick.weakest(), kLimits.min_weakest_direction);
-  EXPECT_GT(brick.lead(kEveryDirection), kLimits.min_contrast);
+  const Asked brick(simulate::box(test::kBrick), test::corner_ahead(500), {}, 0.25);
+  EXPECT_GT(brick.weakest(), test::kLimits.min_weakest_direction);
+  EXPECT_GT(brick.lead(kEveryDirection), test::kLimits.min_contrast);
 }
 
 TEST(Slip, DirectionsThatTheSurfaceHoldsAreNotTried) {
-  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
-  EXPECT_TRUE(slipped_poses(brick.model_from_scan, brick.evidence, brick.model, kLimits.min_weakest_direction, 4.0,
-                            Slips::single)
+  const Asked brick(simulate::box(test::kBrick), test::corner_ahead(500), {}, 0.25);
+  EXPECT_TRUE(slipped_poses(brick.model_from_scan, brick.evidence, brick.model, test::kLimits.min_weakest_direction,
+                            4.0, Slips::single)
                   .empty());
   const Asked slab(simulate::box({400, 400, 40}), Pose(Eigen::Translation3d(0, 0, 500)), {}, 0.25);
-  const auto slipped =
-      slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction, 4.0, Slips::single);
+  const auto slipped = slipped_poses(slab.model_from_scan, slab.evidence, slab.model,
+                                     test::kLimits.min_weakest_direction, 4.0, Slips::single);
   EXPECT_EQ(slipped.size(), 6U) << "two shifts along the face and the turn in it, both ways";
-  EXPECT_EQ(slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction, 4.0,
+  EXPECT_EQ(slipped_poses(slab.model_from_scan, slab.evidence, slab.model, test::kLimits.min_weakest_direction, 4.0,
                           Slips::combined)
                 .size(),
             26U)
       << "and all their sums and differences";
-  EXPECT_EQ(loose_directions(slab.evidence, slab.model, kLimits.min_weakest_direction), 3);
+  EXPECT_EQ(loose_directions(slab.evidence, slab.model, test::kLimits.min_weakest_direction), 3);
 }
 
 // Any three motions span those that a plane leaves free; its edges are met along these.
@@ -77,8 +74,8 @@ TEST(Slip, AFaceSlipsAlongTheAxesOfItsBoxOrTurnsInItself) {
   turned.rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
   const Asked slab(simulate::box({400, 300, 40}), turned, {}, 0.25);
   int along_x = 0, along_y = 0, turns = 0;
-  for (const Pose& pose : slipped_poses(slab.model_from_scan, slab.evidence, slab.model, kLimits.min_weakest_direction,
-                                        4.0, Slips::single)) {
+  for (const Pose& pose : slipped_poses(slab.model_from_scan, slab.evidence, slab.model,
+                                        test::kLimits.min_weakest_direction, 4.0, Slips::single)) {
     const Pose motion = pose * slab.model_from_scan.inverse();
     const Eigen::AngleAxisd turn(motion.linear());
     const Eigen::Vector3d shift = motion * slab.model.box.center().eval() - slab.model.box.center();
@@ -99,7 +96,7 @@ TEST(Slip, AFaceSlipsAlongTheAxesOfItsBoxOrTurnsInItself) {
 // The field of view ends on the face, so that nothing but a plane is seen.
 TEST(Slip, AFaceWithoutItsEdgesHoldsNothing) {
   const Asked slab(simulate::box({400, 400, 40}), Pose(Eigen::Translation3d(0, 0, 500)), {}, 0.25);
-  EXPECT_LT(slab.weakest(), kLimits.min_weakest_direction);
+  EXPECT_LT(slab.weakest(), test::kLimits.min_weakest_direction);
   EXPECT_LE(slab.lead(), 0.0);
 }
 
@@ -114,14 +111,14 @@ TriangleMesh beam(double length) { return simulate::box({length, 40, 30}); }
 
 TEST(Slip, ABeamWhoseEndsAreSeenAsSilhouettesIsHeldByThem) {
   const Asked seen(beam(300), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
-  EXPECT_LT(seen.weakest(), kLimits.min_weakest_direction);
-  EXPECT_GT(seen.lead(), kLimits.min_contrast);
+  EXPECT_LT(seen.weakest(), test::kLimits.min_weakest_direction);
+  EXPECT_GT(seen.lead(), test::kLimits.min_contrast);
 }
 
 TEST(Slip, ABeamThatReachesOutOfTheFieldOfViewIsNot) {
   const Asked seen(beam(1000), beam_from_above(), {test::plate_at({2000, 2000, 10}, {0, 0, 1000})}, 0.4);
-  EXPECT_LT(seen.weakest(), kLimits.min_weakest_direction);
-  EXPECT_LT(seen.lead(), kLimits.min_contrast);
+  EXPECT_LT(seen.weakest(), test::kLimits.min_weakest_direction);
+  EXPECT_LT(seen.lead(), test::kLimits.min_contrast);
 }
 
 TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
@@ -130,16 +127,16 @@ TEST(Slip, ABeamThatHasDriftedSettlesBetweenItsEnds) {
     const Pose drifted = Eigen::Translation3d(drift_mm, 0, 0) * seen.model_from_scan;
     const PoseEvidence evidence =
         evidence_for(drifted, seen.model.dense_samples, seen.model, *seen.seen_by, seen.options);
-    const Pose settled = settled_between_edges(drifted, evidence, seen.model, kLimits.min_weakest_direction,
+    const Pose settled = settled_between_edges(drifted, evidence, seen.model, test::kLimits.min_weakest_direction,
                                                *seen.seen_by, seen.options);
     EXPECT_LT(displacement_mm(settled, seen.model_from_scan, seen.model), 0.01 * seen.model.diameter) << drift_mm;
   }
 }
 
 TEST(Slip, WhatTheSurfaceHoldsIsNotMovedByItsEdges) {
-  const Asked brick(simulate::box(kBrick), test::corner_ahead(500), {}, 0.25);
+  const Asked brick(simulate::box(test::kBrick), test::corner_ahead(500), {}, 0.25);
   const Pose settled = settled_between_edges(brick.model_from_scan, brick.evidence, brick.model,
-                                             kLimits.min_weakest_direction, *brick.seen_by, brick.options);
+                                             test::kLimits.min_weakest_direction, *brick.seen_by, brick.options);
   EXPECT_TRUE(settled.isApprox(brick.model_from_scan));
 }
 

@@ -16,7 +16,7 @@
 namespace asbuilt::verify {
 namespace {
 
-const model::PreparedModel& block() {
+const model::PreparedModel& coarse_block() {
   static const model::PreparedModel model = test::prepared(test::stepped_block(), 0.05);
   return model;
 }
@@ -43,7 +43,7 @@ struct Flaw {
 };
 
 TEST(Verdict, AcceptsACandidateThatNothingStandsAgainst) {
-  const Detection detection = decide({flawless()}, block(), {});
+  const Detection detection = decide({flawless()}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::accepted);
   EXPECT_EQ(detection.reason, Reason::none);
   EXPECT_FALSE(detection.explanation.empty());
@@ -65,7 +65,7 @@ TEST(Verdict, GivesEachReasonToTheCandidateThatDeservesIt) {
   for (const Flaw& flaw : flaws) {
     Candidate candidate = flawless();
     flaw.spoil(candidate);
-    const Detection detection = decide({candidate}, block(), {});
+    const Detection detection = decide({candidate}, coarse_block(), {});
     EXPECT_EQ(detection.status, Status::rejected) << code_of(flaw.reason);
     EXPECT_STREQ(code_of(detection.reason), code_of(flaw.reason));
     EXPECT_THAT(detection.explanation, testing::ContainsRegex("[0-9]")) << "no numbers in the sentence";
@@ -73,7 +73,7 @@ TEST(Verdict, GivesEachReasonToTheCandidateThatDeservesIt) {
 }
 
 TEST(Verdict, WithoutCandidatesIsNoHypothesis) {
-  const Detection detection = decide({}, block(), {});
+  const Detection detection = decide({}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::rejected);
   EXPECT_EQ(detection.reason, Reason::no_hypothesis);
 }
@@ -81,20 +81,20 @@ TEST(Verdict, WithoutCandidatesIsNoHypothesis) {
 TEST(Verdict, AsksForMoreProofWhereMoreIsHidden) {
   Candidate candidate = flawless();
   candidate.score = 0.8, candidate.normal_agreement = 0.85, candidate.residual_ratio = 0.2;  // proves 0.44
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.hidden_share = 0.8;  // 0.34 + 0.15 * 0.8 = 0.46
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::weak_evidence);
 }
 
 TEST(Verdict, WhereOnlyTheEdgesHoldAPoseAsksForManyMeasurementsAndLittleContradiction) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0;
   candidate.slip_lead = 20.0;  // 0.6 % of 4000 are 24
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::under_constrained);
   candidate.slip_lead = 28.0;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.contradiction_share = 0.025;  // allowed where the surface holds it
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::under_constrained);
 }
 
 // 20 of at least 10.8 * (1 + 6 * missing) measurements.
@@ -102,7 +102,7 @@ TEST(Verdict, WhereTheSurfaceFitsAPartOfAnotherSizeItsEdgesMustTell) {
   const auto reason_of = [](double size_hold, double size_lead, double missing_share) {
     Candidate candidate = flawless();
     candidate.size_hold = size_hold, candidate.size_lead = size_lead, candidate.missing_share = missing_share;
-    return decide({candidate}, block(), {}).reason;
+    return decide({candidate}, coarse_block(), {}).reason;
   };
   EXPECT_EQ(reason_of(0.004, 0.0, 0.0), Reason::none);
   EXPECT_EQ(reason_of(0.003, 0.0, 0.0), Reason::under_constrained);
@@ -116,7 +116,7 @@ TEST(Verdict, AsksForMoreHoldWhereMoreReturnedNothing) {
     Candidate candidate = flawless();
     candidate.weakest_direction = weakest_direction, candidate.slip_lead = slip_lead;
     candidate.loose_directions = 1, candidate.missing_share = missing_share;
-    return decide({candidate}, block(), {}).reason;
+    return decide({candidate}, coarse_block(), {}).reason;
   };
   EXPECT_EQ(reason_of(0.004, 0.0, 0.03), Reason::none);
   EXPECT_EQ(reason_of(0.004, 0.0, 0.08), Reason::under_constrained);
@@ -128,25 +128,25 @@ TEST(Verdict, TheOutlineOfOneFaceProvesAPlateButNotABlock) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
   candidate.loose_directions = 3, candidate.facing_share = 0.45;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.facing_share = 0.25;
-  const Detection detection = decide({candidate}, block(), {});
+  const Detection detection = decide({candidate}, coarse_block(), {});
   EXPECT_EQ(detection.reason, Reason::under_constrained);
   EXPECT_THAT(detection.explanation, testing::HasSubstr("25 %"));
   candidate.loose_directions = 1;  // two faces along one edge
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, ALittleMoreSurfaceDecidesNothingAlongWhatOnlyEdgesHold) {
   Candidate best = flawless(), rival = flawless();
-  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * block().diameter, 0, 0));
+  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * coarse_block().diameter, 0, 0));
   rival.support = 0.9 * best.support;
   const Comparison undecided = [](const Candidate&, const Candidate&) { return PoseContrast{3.0, 2.0}; };
-  EXPECT_EQ(decide({best, rival}, block(), {}, undecided).status, Status::accepted);
+  EXPECT_EQ(decide({best, rival}, coarse_block(), {}, undecided).status, Status::accepted);
   for (Candidate* candidate : {&best, &rival}) {
     candidate->weakest_direction = 0.0, candidate->explained_measurements = 1000.0, candidate->slip_lead = 500.0;
   }
-  EXPECT_EQ(decide({best, rival}, block(), {}, undecided).reason, Reason::ambiguous_pose);
+  EXPECT_EQ(decide({best, rival}, coarse_block(), {}, undecided).reason, Reason::ambiguous_pose);
 }
 
 // Loose poses of one place, displaced along x by `offsets_mm`, each with a little less support than the one before it.
@@ -171,19 +171,19 @@ Comparison nearer_wins(double rate) {
 }
 
 TEST(Verdict, OfLoosePosesThatCountAsOneTheEdgesChoose) {
-  const double step = 0.005 * block().diameter;
+  const double step = 0.005 * coarse_block().diameter;
   const std::vector<Candidate> candidates = held_by_edges({2.0 * step, 3.0 * step, 0.0, step});
-  EXPECT_NEAR(offset_mm(decide(candidates, block(), {}).best), 2.0 * step, 1e-9);  // the best by support
-  const auto kept = without_beaten_at_edges(candidates, block(), {}, nearer_wins(10.0 / step));
+  EXPECT_NEAR(offset_mm(decide(candidates, coarse_block(), {}).best), 2.0 * step, 1e-9);  // the best by support
+  const auto kept = without_beaten_at_edges(candidates, coarse_block(), {}, nearer_wins(10.0 / step));
   ASSERT_EQ(kept.size(), 2U);
   EXPECT_NEAR(offset_mm(kept.front()), 0.0, 1e-9);
-  EXPECT_NEAR(offset_mm(decide(kept, block(), {}).best), 0.0, 1e-9);
+  EXPECT_NEAR(offset_mm(decide(kept, coarse_block(), {}).best), 0.0, 1e-9);
 }
 
 TEST(Verdict, EdgesChooseOnlyAmongLoosePosesOfOnePlaceThatNothingSpeaksAgainst) {
-  const double step = 0.005 * block().diameter;
+  const double step = 0.005 * coarse_block().diameter;
   const auto left_of = [](const std::vector<Candidate>& candidates, double rate) {
-    return without_beaten_at_edges(candidates, block(), {}, nearer_wins(rate)).size();
+    return without_beaten_at_edges(candidates, coarse_block(), {}, nearer_wins(rate)).size();
   };
   std::vector<Candidate> candidates = held_by_edges({2.0 * step, 0.0});
   EXPECT_EQ(left_of(candidates, 10.0 / step), 1U);
@@ -201,10 +201,10 @@ TEST(Verdict, EdgesChooseOnlyAmongLoosePosesOfOnePlaceThatNothingSpeaksAgainst) 
 TEST(Verdict, ALeadInSupportDecidesNothingWhereTheScanShowsNoDifference) {
   const Candidate best = flawless();
   Candidate rival = flawless();
-  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * block().diameter, 0, 0));
+  rival.model_from_scan.translate(Eigen::Vector3d(0.2 * coarse_block().diameter, 0, 0));
   rival.support = 0.9 * best.support;
   const Comparison nothing = [](const Candidate&, const Candidate&) { return PoseContrast{0.0, 0.0}; };
-  const Detection detection = decide({best, rival}, block(), {}, nothing);
+  const Detection detection = decide({best, rival}, coarse_block(), {}, nothing);
   EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
   EXPECT_THAT(detection.explanation, testing::HasSubstr("does not show what tells the pose"));
 }
@@ -213,18 +213,18 @@ TEST(Verdict, WithoutRaysEdgesMustShowMoreBeforeTheyHoldAPose) {
   Candidate candidate = flawless();
   candidate.weakest_direction = 0.0, candidate.explained_measurements = 4000.0, candidate.slip_lead = 50.0;
   candidate.residual_ratio = 0.05;  // proves enough without rays
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.without_rays = true;
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::under_constrained);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::under_constrained);
   candidate.slip_lead = 150.0;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
   const auto judged = [](const std::function<void(Candidate&)>& spoil) {
     Candidate candidate = flawless();
     spoil(candidate);
-    return decide({candidate}, block(), {});
+    return decide({candidate}, coarse_block(), {});
   };
   EXPECT_TRUE(is_beyond_doubt(judged([](Candidate&) {}), {}));
   const std::vector<std::function<void(Candidate&)>> flaws{
@@ -242,40 +242,40 @@ TEST(Verdict, IsBeyondDoubtOnlyWhereEveryLimitIsClearedByFar) {
 TEST(Verdict, AsksForMoreProofWhereMoreReturnedNothing) {
   Candidate candidate = flawless();
   candidate.score = 0.75, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.44
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.missing_share = 0.45;  // 0.34 + 0.3 * 0.45 = 0.475
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::weak_evidence);
 }
 
 TEST(Verdict, AsksForMoreProofWhereOnlyEdgesHoldThePose) {
   Candidate candidate = flawless();
   candidate.score = 0.8, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.42
   candidate.explained_measurements = 1000.0, candidate.slip_lead = 500.0;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.weakest_direction = 0.0;  // 0.34 + 0.12 = 0.46
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::weak_evidence);
   candidate.residual_ratio = 0.1;  // proves 0.53
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, AsksForMoreProofWhereNoRayCanRefuteThePose) {
   Candidate candidate = flawless();
   candidate.score = 0.9, candidate.normal_agreement = 0.9, candidate.residual_ratio = 0.2;  // proves 0.53
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.without_rays = true;  // 0.34 + 0.26 = 0.6
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::weak_evidence);
   candidate.residual_ratio = 0.1;  // proves 0.67
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, ContradictionsAndOverrunMayNotBothBeNearTheirLimits) {
   Candidate candidate = flawless();
   candidate.contradiction_share = 0.028;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.overrun_share = 0.03;  // 0.93 and 0.25 of their limits
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::contradicted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::contradicted);
   candidate.contradiction_share = 0.0;
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, OfManyPosesOneThatIsNotProvedFarBeyondMayBeDeniedHalfAsMuch) {
@@ -285,32 +285,32 @@ TEST(Verdict, OfManyPosesOneThatIsNotProvedFarBeyondMayBeDeniedHalfAsMuch) {
   proved.contradiction_share = 0.8 * of_many.max_contradiction_share;
   Candidate doubtful = proved;  // 0.8 * 0.75 * (1 - 0.15 / 0.577) = 0.44
   doubtful.score = 0.8, doubtful.normal_agreement = 0.75;
-  EXPECT_EQ(decide({proved}, block(), of_many).status, Status::accepted);
-  EXPECT_EQ(decide({doubtful}, block(), {}).status, Status::accepted);
-  EXPECT_EQ(decide({doubtful}, block(), of_many).reason, Reason::contradicted);
+  EXPECT_EQ(decide({proved}, coarse_block(), of_many).status, Status::accepted);
+  EXPECT_EQ(decide({doubtful}, coarse_block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({doubtful}, coarse_block(), of_many).reason, Reason::contradicted);
   doubtful.contradiction_share *= 0.5;
-  EXPECT_EQ(decide({doubtful}, block(), of_many).status, Status::accepted);
+  EXPECT_EQ(decide({doubtful}, coarse_block(), of_many).status, Status::accepted);
 }
 
 TEST(Verdict, EdgesThatTheSurfacePassesWeakenTheProof) {
   Candidate candidate = flawless();
   candidate.score = 0.72, candidate.normal_agreement = 0.8, candidate.residual_ratio = 0.2;  // proves 0.376
-  EXPECT_EQ(decide({candidate}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).status, Status::accepted);
   candidate.overrun_share = 0.11;  // allowed by itself; 0.376 * 0.89 = 0.335
-  EXPECT_EQ(decide({candidate}, block(), {}).reason, Reason::weak_evidence);
+  EXPECT_EQ(decide({candidate}, coarse_block(), {}).reason, Reason::weak_evidence);
 }
 
 TEST(Verdict, IsNotShakenByARefutedPoseWithMoreSupport) {
   Candidate larger_thing = flawless({0, 0, 900}), part = flawless();
   larger_thing.support = 0.5, larger_thing.overrun_share = 0.6;
-  const Detection detection = decide({larger_thing, part}, block(), {});
+  const Detection detection = decide({larger_thing, part}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::accepted);
   EXPECT_EQ(detection.best.overrun_share, 0.0);
-  EXPECT_EQ(decide({larger_thing}, block(), {}).reason, Reason::contradicted);
+  EXPECT_EQ(decide({larger_thing}, coarse_block(), {}).reason, Reason::contradicted);
 }
 
 TEST(Verdict, OnASecondInstanceIsAmbiguous) {
-  const Detection detection = decide({flawless(), flawless({300, 0, 600})}, block(), {});
+  const Detection detection = decide({flawless(), flawless({300, 0, 600})}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::ambiguous);
   EXPECT_EQ(detection.reason, Reason::second_instance);
   EXPECT_EQ(detection.candidates.size(), 2U);
@@ -321,7 +321,7 @@ TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
     Candidate face = flawless({300, 0, 600});
     face.weakest_direction = 0.0, face.slip_lead = 60.0, face.loose_directions = 2;
     face.missing_share = missing_share, face.support = support;
-    return decide({best, face}, block(), {});
+    return decide({best, face}, coarse_block(), {});
   };
   for (const double support : {0.3, 0.5}) {
     const Detection detection = status_beside(flawless(), 0.3, support);
@@ -336,20 +336,20 @@ TEST(Verdict, BesideAPoseBeyondDoubtAFaceBetweenEdgesIsNoSecondInstance) {
 
 TEST(Verdict, KnowsASecondPlacementFromClutterAndFromAnotherPoseInThePlace) {
   const Candidate best = flawless();
-  EXPECT_TRUE(is_second_instance(best, flawless({300, 0, 600}), block(), {}));
-  EXPECT_FALSE(is_second_instance(best, flawless({5, 0, 600}), block(), {})) << "in the same place";
+  EXPECT_TRUE(is_second_instance(best, flawless({300, 0, 600}), coarse_block(), {}));
+  EXPECT_FALSE(is_second_instance(best, flawless({5, 0, 600}), coarse_block(), {})) << "in the same place";
   Candidate rejected = flawless({300, 0, 600});
   rejected.score = 0.5;
-  EXPECT_FALSE(is_second_instance(best, rejected, block(), {}));
+  EXPECT_FALSE(is_second_instance(best, rejected, coarse_block(), {}));
   Candidate small = flawless({300, 0, 600});
   small.support = 0.2 * best.support;
-  EXPECT_FALSE(is_second_instance(best, small, block(), {})) << "explains too little beside the best";
+  EXPECT_FALSE(is_second_instance(best, small, coarse_block(), {})) << "explains too little beside the best";
 }
 
 TEST(Verdict, TellsOfEveryCandidateWhatStandsAgainstIt) {
   Candidate loser = flawless({300, 0, 600});
   loser.support = 0.1, loser.score = 0.3;
-  const Detection detection = decide({flawless(), loser}, block(), {});
+  const Detection detection = decide({flawless(), loser}, coarse_block(), {});
   ASSERT_EQ(detection.candidates.size(), 2U);
   EXPECT_EQ(detection.candidates[0].objection, Reason::none);
   EXPECT_EQ(detection.candidates[1].objection, Reason::low_score);
@@ -357,27 +357,27 @@ TEST(Verdict, TellsOfEveryCandidateWhatStandsAgainstIt) {
 
 TEST(Verdict, OnTwoPosesInOnePlaceIsAmbiguousIfTheyAreAboutEquallySupported) {
   Candidate turned = flawless();
-  const Eigen::Translation3d centre(Eigen::Vector3d(bounding_box(block().skin).center()));
+  const Eigen::Translation3d centre(Eigen::Vector3d(bounding_box(coarse_block().skin).center()));
   turned.model_from_scan = centre * Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()) * centre.inverse() *
                            turned.model_from_scan;
   turned.support = 0.399;
-  const Detection detection = decide({flawless(), turned}, block(), {});
+  const Detection detection = decide({flawless(), turned}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::ambiguous);
   EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
   turned.support = 0.3;
-  EXPECT_EQ(decide({flawless(), turned}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({flawless(), turned}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, IsNotShakenByARivalThatWouldBeRejected) {
   Candidate rival = flawless({300, 0, 600});
   rival.free_space_violations = 0.5;
-  EXPECT_EQ(decide({flawless(), rival}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({flawless(), rival}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, CountsNearlyEqualPosesAsOne) {
   Candidate again = flawless({0.5, 0, 600});
   again.support = 0.39, again.votes = 100.0;
-  const Detection detection = decide({again, flawless()}, block(), {});
+  const Detection detection = decide({again, flawless()}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::accepted);
   EXPECT_EQ(detection.candidates.size(), 1U);
   EXPECT_EQ(detection.best.support, 0.4) << "the best, in whatever order they come";
@@ -412,7 +412,7 @@ TEST(Verdict, TakesPosesThatTheSymmetryMakesOneForOne) {
 
 TEST(Verdict, BetweenRivalsGoesByWhereTheyDiffer) {
   const Candidate first = flawless();
-  Candidate second = turned(first, std::numbers::pi, block());
+  Candidate second = turned(first, std::numbers::pi, coarse_block());
   second.support = 0.399;
   PoseContrast seen;
   const Comparison compare = [&](const Candidate& a, const Candidate&) {
@@ -420,18 +420,18 @@ TEST(Verdict, BetweenRivalsGoesByWhereTheyDiffer) {
     return in_order ? seen : PoseContrast{seen.for_second, seen.for_first};
   };
   seen = {60.0, 2.0};
-  Detection detection = decide({first, second}, block(), {}, compare);
+  Detection detection = decide({first, second}, coarse_block(), {}, compare);
   EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
   EXPECT_EQ(detection.best.support, first.support);
   seen = {2.0, 60.0};
-  detection = decide({first, second}, block(), {}, compare);
+  detection = decide({first, second}, coarse_block(), {}, compare);
   EXPECT_EQ(detection.status, Status::accepted) << detection.explanation;
   EXPECT_EQ(detection.best.support, second.support) << "won where it counts, against a small lead in support";
   seen = {30.0, 25.0};
-  detection = decide({first, second}, block(), {}, compare);
+  detection = decide({first, second}, coarse_block(), {}, compare);
   EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
   seen = {3.0, 0.0};
-  detection = decide({first, second}, block(), {}, compare);
+  detection = decide({first, second}, coarse_block(), {}, compare);
   EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
   EXPECT_THAT(detection.explanation, testing::HasSubstr("does not show"));
 }
@@ -439,13 +439,13 @@ TEST(Verdict, BetweenRivalsGoesByWhereTheyDiffer) {
 TEST(Verdict, IsAmbiguousWhereOnlyTheTurnAboutANearAxisIsLoose) {
   Candidate loose = flawless();
   loose.weakest_direction = 0.0;
-  EXPECT_EQ(decide({loose}, block(), {}).reason, Reason::under_constrained);
+  EXPECT_EQ(decide({loose}, coarse_block(), {}).reason, Reason::under_constrained);
   loose.weakest_but_near = 0.05;
-  const Detection detection = decide({loose}, block(), {});
+  const Detection detection = decide({loose}, coarse_block(), {});
   EXPECT_EQ(detection.status, Status::ambiguous);
   EXPECT_EQ(detection.reason, Reason::ambiguous_pose);
   loose.weakest_direction = 0.003;  // of 500 samples, 1.5 hold the turn
-  EXPECT_EQ(decide({loose}, block(), {}).status, Status::accepted);
+  EXPECT_EQ(decide({loose}, coarse_block(), {}).status, Status::accepted);
 }
 
 TEST(Verdict, InPaperModeKnowsNoSymmetry) {
@@ -461,9 +461,9 @@ TEST(Verdict, InPaperModeLooksAtScoreAndNormalsAlone) {
   options.paper_mode = true;
   Candidate candidate = flawless();
   candidate.free_space_violations = 0.5, candidate.contradiction_share = 0.5, candidate.weakest_direction = 0.0;
-  EXPECT_EQ(decide({candidate}, block(), options).status, Status::accepted);
+  EXPECT_EQ(decide({candidate}, coarse_block(), options).status, Status::accepted);
   candidate.normal_agreement = 0.3;
-  EXPECT_EQ(decide({candidate}, block(), options).reason, Reason::normals_disagree);
+  EXPECT_EQ(decide({candidate}, coarse_block(), options).reason, Reason::normals_disagree);
 }
 
 TEST(Reasons, HaveCodesThatAreAllDifferent) {
@@ -478,11 +478,11 @@ TEST(Displacement, BoundsThatOfEveryVertex) {
   const Pose a = test::pose_at({1, 2, 3}), b = test::pose_at({2, 2, 3}, {2.2, 0.6, 0.4});
   const Pose b_from_a = b * a.inverse();
   double largest = 0.0;
-  for (const Eigen::Vector3d& vertex : block().skin.vertices) {
+  for (const Eigen::Vector3d& vertex : coarse_block().skin.vertices) {
     largest = std::max(largest, (b_from_a * vertex - vertex).norm());
   }
-  EXPECT_GE(displacement_mm(a, b, block()), largest - 1e-9);
-  EXPECT_LT(displacement_mm(a, a, block()), 1e-9);
+  EXPECT_GE(displacement_mm(a, b, coarse_block()), largest - 1e-9);
+  EXPECT_LT(displacement_mm(a, a, coarse_block()), 1e-9);
 }
 
 }  // namespace
