@@ -8,6 +8,7 @@
 
 #include "asbuilt/core/disjoint_sets.h"
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::detect {
@@ -54,7 +55,7 @@ bool is_large_plane(const PointCloud& samples, std::span<const float> spacings_m
     covariance += offset * offset.transpose();
   }
   covariance /= static_cast<double>(members.size());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  const SymmetricEigen<3> solver(covariance);
   if (std::sqrt(std::max(0.0, solver.eigenvalues()[0])) > 0.3 * spacing_mm) return false;
   double low = std::numeric_limits<double>::infinity(), high = -low;
   const Eigen::Vector3d axis = solver.eigenvectors().col(2);

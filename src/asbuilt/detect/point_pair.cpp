@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "asbuilt/core/matrix_factors.h"
+
 namespace asbuilt::detect {
 namespace {
 
@@ -38,8 +40,7 @@ PointPairFeature point_pair_feature(const Eigen::Vector3f& point_i, const Eigen:
 
 Pose local_frame(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) {
   Pose frame = Pose::Identity();
-  frame.linear() =
-      Eigen::Quaterniond::FromTwoVectors(normal.cast<double>(), Eigen::Vector3d::UnitX()).toRotationMatrix();
+  frame.linear() = rotation_between(normal.cast<double>(), Eigen::Vector3d::UnitX()).toRotationMatrix();
   frame.translation() = -(frame.linear() * point.cast<double>());
   return frame;
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/evaluate/surface_error.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/result.h"
 #include "asbuilt/core/robust.h"
@@ -74,7 +74,7 @@ class Alignment {
     damped.diagonal() *= 1.0 + damping;
     damped.diagonal().array() += 1e-12 * system.matrix.trace();  // a plane or sphere leaves directions open
     const Eigen::Vector3d middle = motion * centre_;
-    const Pose step = pose_from_twist(damped.ldlt().solve(system.right_side));
+    const Pose step = pose_from_twist(solve_symmetric(damped, system.right_side));
     return orthonormalised(Eigen::Translation3d(middle) * step * Eigen::Translation3d(-middle) * motion);
   }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/voxel_grid.h"
 
@@ -119,7 +120,7 @@ VertexPlace nearest_to_planes(const std::vector<const Crossing*>& crossings) {
     directions += normal * normal.transpose();
     right_side += normal * normal.dot(crossing->point.cast<double>() - mean);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(directions);
+  const SymmetricEigen<3> eigen(directions);
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     if (eigen.eigenvalues()[k] < kEdgeShare * eigen.eigenvalues()[2]) continue;

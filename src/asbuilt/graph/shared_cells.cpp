@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/graph/shared_cells.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/pose.h"
 
 namespace asbuilt::graph {
@@ -61,8 +61,7 @@ double SharedCells::firmness() const {
         static_cast<double>(by_axis_[axis].cells);
   }
   information.bottomLeftCorner<3, 3>() = information.topRightCorner<3, 3>().transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information, Eigen::EigenvaluesOnly);
-  const double least = eigen.eigenvalues()[0];
+  const double least = SymmetricEigen<6>(information).eigenvalues()[0];
   return least > kRounding * all ? least : 0.0;
 }
 

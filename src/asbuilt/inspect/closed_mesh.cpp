@@ -13,6 +13,7 @@
 #include <tuple>
 #include <utility>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/model/mesh_edges.h"
 #include "asbuilt/model/surface_mesh.h"
 
@@ -101,7 +102,7 @@ Displacement displacement_of(std::span<const std::uint32_t> vertices, const std:
       if (measured == 1) result.vector = static_cast<double>(spots[v].deviation_mm) * normal;
     }
   }
-  if (measured > 1) result.vector = information.ldlt().solve(moment);
+  if (measured > 1) result.vector = solve_symmetric(information, moment);
   return result;
 }
 

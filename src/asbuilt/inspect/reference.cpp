@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/io/file.h"
 #include "asbuilt/io/input.h"
 #include "asbuilt/io/lines.h"
@@ -75,7 +75,7 @@ LocalPlane plane_about(const std::vector<KdTree::Neighbour>& near, const std::ve
     const Eigen::Vector3d offset = positions[n.index].cast<double>() - plane.centre;
     scatter += offset * offset.transpose() / count;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
+  const SymmetricEigen<3> eigen(scatter);
   plane.normal = eigen.eigenvectors().col(0);
   if (plane.normal.dot(outwards) < 0.0) plane.normal = -plane.normal;
   plane.rms = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::inspect {
@@ -187,7 +188,7 @@ Eigen::Vector3d Witnesses::plane_through(const Eigen::Vector3f& position, const 
     information += row * row.transpose();
     moment += static_cast<double>(witnesses[n.witness].deviation) * row;
   }
-  return information.ldlt().solve(moment);
+  return solve_symmetric(information, moment);
 }
 
 /// Sum of squared deviations about the best linear function of the place.

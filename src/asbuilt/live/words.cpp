@@ -3,11 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+
+#include "asbuilt/core/matrix_factors.h"
 
 namespace asbuilt::live {
 namespace {
@@ -166,7 +167,7 @@ std::vector<WeakDirection> weak_directions(const Matrix6d& covariance, const Eig
   Matrix6d moved = Matrix6d::Identity();
   moved.topLeftCorner<3, 3>() *= 0.25 * diameter_mm;
   moved.bottomLeftCorner<3, 3>() = -cross_matrix(centre);
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(moved * covariance * moved.transpose());
+  const SymmetricEigen<6> solver(moved * covariance * moved.transpose());
   const Vector6d sigma = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   const double usual = std::max(sigma[2], 1e-9);
   std::vector<WeakDirection> weak;

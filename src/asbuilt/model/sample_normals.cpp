@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/model/sample_normals.h"
 
-#include <Eigen/Eigenvalues>
-
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::model {
@@ -20,7 +19,7 @@ Eigen::Vector3d plane_normal(const std::vector<Eigen::Vector3d>& points, const E
   mean /= static_cast<double>(points.size());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points) spread += (point - mean) * (point - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  const SymmetricEigen<3> solver(spread);
   if (!(solver.eigenvalues()[1] > kFlatAcross * solver.eigenvalues()[2])) return face_normal;
   const Eigen::Vector3d normal = solver.eigenvectors().col(0);
   const double agreement = normal.dot(face_normal);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/model/sampling_choice.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/model/distance_field.h"
 
 namespace asbuilt::model {
@@ -43,7 +43,7 @@ Eigen::Vector3d principal_extents(const TriangleMesh& mesh) {
     for (int k = 0; k < 3; ++k) add(mesh.vertices[static_cast<std::size_t>(mesh.triangles[i][k])] - mean);
     add(3.0 * (middle(mesh.triangles[i]) - mean));
   }
-  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  const Eigen::Matrix3d axes = SymmetricEigen<3>(spread).eigenvectors();
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3i& triangle : mesh.triangles) {
     for (int k = 0; k < 3; ++k)

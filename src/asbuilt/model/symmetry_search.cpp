@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 
 namespace asbuilt::model {
@@ -232,7 +233,7 @@ class Search {
     }
     // What no sample holds (the turn of a cylinder) stays where it is.
     matrix.diagonal().array() += 1e-6 * matrix.trace() + 1e-12;
-    Vector6d twist = matrix.ldlt().solve(right_side);
+    Vector6d twist = solve_symmetric(matrix, right_side);
     twist.head<3>() /= lever;
     const Eigen::Vector3d about = motion * centre_;
     return Eigen::Translation3d(about) * pose_from_twist(twist) * Eigen::Translation3d(-about) * motion;
@@ -345,7 +346,7 @@ class Search {
       const Eigen::Vector3d offset = position.cast<double>() - centre_;
       spread += offset * offset.transpose();
     }
-    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+    return SymmetricEigen<3>(spread).eigenvectors();
   }
 
   [[nodiscard]] bool is_same(const Axis& a, const Axis& b) const {

@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/robust.h"
@@ -129,7 +129,7 @@ class GaugeFit {
     const double deviation = std::max(spread(residuals), 1e-6 * diameter_);
     const Sums sums = sums_of(residuals, kTukeyTuning * deviation);
     if (!(sums.weight > 0.0)) return Matrix6d::Zero();
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(sums.information / sums.weight);
+    const SymmetricEigen<6> eigen(sums.information / sums.weight);
     const Vector6d held = (eigen.eigenvalues().array() < kUnheld).select(0.0, eigen.eigenvalues());
     const Matrix6d scaled = eigen.eigenvectors() * held.asDiagonal() * eigen.eigenvectors().transpose();
     const Matrix6d scaled_from_twist = Scaling{centre_, length_}.twist_from_scaled().inverse();
@@ -206,7 +206,7 @@ class GaugeFit {
   }
 
   [[nodiscard]] static Vector6d held_step(const Sums& sums, double damping) {
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(sums.information / sums.weight);
+    const SymmetricEigen<6> eigen(sums.information / sums.weight);
     const Vector6d along = eigen.eigenvectors().transpose() * (sums.gradient / sums.weight);
     Vector6d step = Vector6d::Zero();
     for (int i = 0; i < 6; ++i) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/refine/hold.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "asbuilt/core/matrix_factors.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -22,10 +22,7 @@ void orient(Eigen::Vector3d& direction) {
 }
 
 // The basis of the same space in which slides stand apart from turns.
-Motions slides_apart(const Motions& basis) {
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(basis.topRows<3>(), Eigen::ComputeFullV);
-  return basis * svd.matrixV();
-}
+Motions slides_apart(const Motions& basis) { return basis * right_singular_vectors(basis.topRows<3>()).vectors; }
 
 Motion motion_of(const Vector6d& column, const Eigen::Vector3d& centre, double radius_mm) {
   const Eigen::Vector3d rotation = column.head<3>() / radius_mm, translation = column.tail<3>();
@@ -54,7 +51,7 @@ ViewHold view_hold(const Matrix6d& covariance, const Motions& unheld, const Eige
   ViewHold hold;
   // What nothing holds is told apart from what is: its huge variance would leak into the rest by rounding.
   const Matrix6d kept = Matrix6d::Identity() - unheld * unheld.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(kept * covariance * kept);
+  const SymmetricEigen<6> eigen(kept * covariance * kept);
   const Eigen::Index free = unheld.cols();
   // Ascending; the first `free` are the zeros of the projection.
   const Vector6d sigma = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();

@@ -2,13 +2,13 @@
 #include "asbuilt/refine/normal_equations.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/robust.h"
 #include "asbuilt/refine/edge_residual.h"
@@ -112,8 +112,8 @@ LocalInformation local_information(const EdgeSums& both_ways, const Scaling& sca
   local.radius_mm = radius;
   local.scaled_from_local.topLeftCorner<3, 3>() *= scaling.length_mm / radius;
   local.scaled_from_local.bottomLeftCorner<3, 3>() = cross_matrix(local.centre) / radius;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(local.scaled_from_local.transpose() * both_ways.information *
-                                                      local.scaled_from_local / both_ways.weight);
+  const SymmetricEigen<6> eigen(local.scaled_from_local.transpose() * both_ways.information * local.scaled_from_local /
+                                both_ways.weight);
   local.held = eigen.eigenvalues();
   local.motions = eigen.eigenvectors();
   return local;

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -12,6 +10,7 @@
 #include <utility>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/refine/cell_gradients.h"
@@ -108,7 +107,7 @@ Matrix6d widened(const Matrix6d& motions, const Vector6d& variances, Eigen::Inde
   const Matrix6d own = motions * variances.asDiagonal() * motions.transpose();
   if (held == 0 || !(variances.head(held).minCoeff() > 0.0)) return own;
   const Eigen::MatrixXd unit = motions.leftCols(held) * variances.head(held).cwiseSqrt().cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ratios(unit.transpose() * least * unit);
+  const SymmetricEigen<Eigen::Dynamic> ratios(unit.transpose() * least * unit);
   const Eigen::MatrixXd wide =
       motions.leftCols(held) * variances.head(held).cwiseSqrt().asDiagonal() * ratios.eigenvectors();
   const Eigen::VectorXd more = (ratios.eigenvalues().array() - 1.0).cwiseMax(0.0);
@@ -593,10 +592,7 @@ class JointRefinement {
     local_from_scaled.topLeftCorner<3, 3>() *= views_[v].radius_mm / scaling_.length_mm;
     local_from_scaled.bottomLeftCorner<3, 3>() = -cross_matrix(centre - scaling_.origin) / scaling_.length_mm;
     Eigen::Matrix<double, 6, Eigen::Dynamic> basis = local_from_scaled * unheld;
-    if (basis.cols() > 0) {
-      const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
-      basis = Eigen::MatrixXd(qr.householderQ()).leftCols(basis.cols());
-    }
+    if (basis.cols() > 0) basis = orthogonal_basis(basis).leftCols(basis.cols()).eval();
     return view_hold(local_from_scaled * scaled_covariance * local_from_scaled.transpose(), basis, centre,
                      views_[v].radius_mm, usual_scale_, diameter_);
   }
@@ -635,7 +631,7 @@ class JointRefinement {
   // Gradients whose spread is that of a pose that the CAD holds as well as model_holds_ says.
   void add_model_cells(std::span<const LinkBlock> model, std::vector<CellGradient>& cells) const {
     for (std::size_t h = 0; h < model.size(); ++h) {
-      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(model_holds_[h].information);
+      const SymmetricEigen<6> eigen(model_holds_[h].information);
       for (Eigen::Index i = 0; i < 6; ++i) {
         const double root = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]));
         const std::uint32_t cell = cells.empty() ? 0 : cells.back().cell + 1;
@@ -655,7 +651,7 @@ class JointRefinement {
         result.view_holds.emplace_back();
         continue;
       }
-      const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(inverse[v]);
+      const SymmetricEigen<6> eigen(inverse[v]);
       Vector6d variances = Vector6d::Zero();
       const Eigen::Index free = (eigen.eigenvalues().array() > equations.unheld_variance()).count();
       for (int i = 0; i < 6; ++i) {

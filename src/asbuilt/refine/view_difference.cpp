@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/refine/view_difference.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 #include "asbuilt/core/robust.h"
@@ -158,7 +158,7 @@ Pose ComparedViews::aligned(int a, int b, const Pose& b_from_a) const {
       weights += weight;
     }
     if (!(weights > 0.0)) return pose;
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information / weights);
+    const SymmetricEigen<6> eigen(information / weights);
     Vector6d twist = Vector6d::Zero();
     for (int i = 0; i < 6; ++i) {
       if (eigen.eigenvalues()[i] < kFirmlyHeld) continue;

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "asbuilt/core/cube_rows.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/median.h"
 #include "asbuilt/core/parallel.h"
 
@@ -39,7 +40,7 @@ double quadric_residual(std::span<const Eigen::Vector3f> points, std::span<const
     right += row * height;
     heights_squared += height * height;
   }
-  const Eigen::Matrix<double, kQuadricUnknowns, 1> solution = system.ldlt().solve(right);
+  const Eigen::Matrix<double, kQuadricUnknowns, 1> solution = solve_symmetric(system, right);
   const double squared = std::max(0.0, heights_squared - right.dot(solution));
   const double freedom = static_cast<double>(neighbours.size()) - kQuadricUnknowns;
   return reach * std::sqrt(squared / freedom);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "asbuilt/core/disjoint_sets.h"
+#include "asbuilt/core/matrix_factors.h"
 
 namespace asbuilt::simulate {
 namespace {
@@ -90,7 +91,7 @@ Eigen::Vector3d sharp_point(const std::vector<Eigen::Vector3d>& points, const st
     normal_matrix += normals[i] * normals[i].transpose();
     right_side += normals[i] * normals[i].dot(points[i] - mean);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal_matrix);
+  const SymmetricEigen<3> eigen(normal_matrix);
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     if (eigen.eigenvalues()[k] < 0.05 * eigen.eigenvalues()[2]) continue;

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/simulate/mesh_edit.h"
 
 namespace asbuilt::simulate {
@@ -72,8 +73,7 @@ Eigen::Matrix3d resting_rotation(const TriangleMesh& mesh, Random& random) {
       height = other_height;
     }
   }
-  const Eigen::Matrix3d settled =
-      Eigen::Quaterniond::FromTwoVectors(down, -Eigen::Vector3d::UnitZ()).normalized().toRotationMatrix();
+  const Eigen::Matrix3d settled = rotation_between(down, -Eigen::Vector3d::UnitZ()).normalized().toRotationMatrix();
   const double yaw = random.uniform(0.0, 2.0 * std::numbers::pi);
   return Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix() * settled;
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/evidence.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/scan/normals.h"
 
 namespace asbuilt::verify {
@@ -215,8 +215,7 @@ double PoseEvidence::score() const {
 
 double PoseEvidence::weakest_direction() const {
   if (explained_samples == 0) return 0.0;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information, Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[0]) / static_cast<double>(explained_samples);
+  return std::max(0.0, SymmetricEigen<6>(information).eigenvalues()[0]) / static_cast<double>(explained_samples);
 }
 
 double PoseEvidence::support(double contradiction_weight) const {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/lm_icp.h"
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/robust.h"
 #include "asbuilt/verify/sensor_in_model.h"
 
@@ -99,7 +99,7 @@ Vector6d damped_step(const NormalEquations& equations, double damping) {
   Matrix6d system = equations.information;
   const Vector6d diagonal = system.diagonal();
   system.diagonal() += damping * diagonal + Vector6d::Constant(1e-9 * diagonal.maxCoeff() + 1e-12);
-  return -system.ldlt().solve(equations.gradient);
+  return -solve_symmetric(system, equations.gradient);
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/near_poses.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "asbuilt/core/matrix_factors.h"
 
 namespace asbuilt::verify {
 namespace {
@@ -291,11 +291,11 @@ double weakest_direction(const PoseEvidence& evidence, const model::PreparedMode
   if (free.empty() || evidence.explained_samples == 0) return evidence.weakest_direction();
   Eigen::MatrixXd columns(6, static_cast<Eigen::Index>(free.size()));
   for (std::size_t i = 0; i < free.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = free[i];
-  const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(columns).householderQ();
+  const Eigen::MatrixXd q = orthogonal_basis(columns);
   const Eigen::MatrixXd held = q.rightCols(6 - columns.cols());
   const Eigen::MatrixXd information = held.transpose() * evidence.information * held;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(information, Eigen::EigenvaluesOnly);
-  return std::max(0.0, solver.eigenvalues()[0]) / static_cast<double>(evidence.explained_samples);
+  const double least = SymmetricEigen<Eigen::Dynamic>(information).eigenvalues()[0];
+  return std::max(0.0, least) / static_cast<double>(evidence.explained_samples);
 }
 
 double surface_moved_mm(const Pose& motion, const model::PreparedModel& model) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/pierced_plane.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "asbuilt/core/kd_tree.h"
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/core/random.h"
 
 namespace asbuilt::verify {
@@ -69,7 +69,7 @@ Plane fitted_again(const Plane& plane, const std::vector<Oriented>& points, floa
   centre /= static_cast<double>(on_it.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : on_it) scatter += (point - centre) * (point - centre).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
+  const SymmetricEigen<3> solver(scatter);
   const Eigen::Vector3f normal = solver.eigenvectors().col(0).cast<float>();
   return {normal, normal.dot(centre.cast<float>())};
 }

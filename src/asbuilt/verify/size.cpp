@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/size.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/verify/contrast.h"
 
 namespace asbuilt::verify {
@@ -31,7 +31,7 @@ double ridge(const PoseEvidence& evidence) {
 Eigen::Vector3d fixed_point(const PoseEvidence& evidence, const model::PreparedModel& model) {
   Eigen::Matrix3d information = evidence.information.bottomRightCorner<3, 3>();
   information.diagonal().array() += ridge(evidence);
-  const Eigen::Vector3d shift = information.ldlt().solve(evidence.twist_growth.tail<3>());
+  const Eigen::Vector3d shift = solve_symmetric(information, evidence.twist_growth.tail<3>());
   return model.box.center() + 0.5 * model.diameter * shift;
 }
 
@@ -41,7 +41,7 @@ double size_hold(const PoseEvidence& evidence) {
   if (evidence.explained_samples == 0) return 0.0;
   Matrix6d information = evidence.information;
   information.diagonal().array() += ridge(evidence);
-  const Vector6d twist = information.ldlt().solve(evidence.twist_growth);
+  const Vector6d twist = solve_symmetric(information, evidence.twist_growth);
   const double left =
       evidence.growth - 2.0 * evidence.twist_growth.dot(twist) + twist.dot(evidence.information * twist);
   return std::max(0.0, left) / static_cast<double>(evidence.explained_samples);

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asbuilt/verify/slip.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "asbuilt/core/matrix_factors.h"
 #include "asbuilt/verify/contrast.h"
 #include "asbuilt/verify/lm_icp.h"
 #include "asbuilt/verify/near_poses.h"
@@ -36,10 +34,10 @@ Twists turns_and_shifts(const Twists& basis) {
   constexpr double kPureShift = 0.05;  // share of the turn in a unit twist
   const Eigen::Index count = basis.cols();
   const Eigen::Matrix3Xd turns = basis.topRows<3>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(turns, Eigen::ComputeFullV);
-  Twists sorted = basis * svd.matrixV();
+  const RightSingularVectors singular = right_singular_vectors(turns);
+  Twists sorted = basis * singular.vectors;
   Eigen::Index first_shift = 0;
-  while (first_shift < std::min<Eigen::Index>(count, 3) && svd.singularValues()[first_shift] > kPureShift) ++first_shift;
+  while (first_shift < std::min<Eigen::Index>(count, 3) && singular.values[first_shift] > kPureShift) ++first_shift;
   const Eigen::Index shifts = count - first_shift;
   if (shifts < 2) return sorted;
   const Eigen::Matrix3Xd along = sorted.bottomRightCorner(3, shifts);
@@ -51,7 +49,7 @@ Twists turns_and_shifts(const Twists& basis) {
   });
   Eigen::MatrixXd wanted(shifts, shifts);
   for (Eigen::Index i = 0; i < shifts; ++i) wanted.col(i) = followed.col(axes[static_cast<std::size_t>(i)]);
-  const Eigen::MatrixXd turned = Eigen::HouseholderQR<Eigen::MatrixXd>(wanted).householderQ();
+  const Eigen::MatrixXd turned = orthogonal_basis(wanted);
   sorted.rightCols(shifts) = (sorted.rightCols(shifts) * turned).eval();
   return sorted;
 }
@@ -63,7 +61,7 @@ std::vector<Vector6d> loosest(const PoseEvidence& evidence, const model::Prepare
   for (const Vector6d& twist : free_twists(model)) {
     information += 1e3 * evidence.information.trace() * twist * twist.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
+  const SymmetricEigen<6> solver(information);
   Eigen::Index count = 0;
   while (count < kLoosest && solver.eigenvalues()[count] < below) ++count;
   if (count == 0) return {};
