@@ -47,13 +47,6 @@ std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::
   return links;
 }
 
-std::vector<std::pair<int, int>> linked_pairs(const graph::PoseGraph& graph) {
-  std::vector<std::pair<int, int>> pairs;
-  for (const graph::PairOverlap& edge : graph.edges) pairs.emplace_back(edge.first, edge.second);
-  std::ranges::sort(pairs);
-  return pairs;
-}
-
 Trial trial_of(const char* kind, const RefinementScene& scene, std::string variant, std::uint64_t seed,
                const JointRun& run) {
   Trial trial{kind, scene.name, std::move(variant), seed, {}, {}};
@@ -105,18 +98,21 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     run.cpu_seconds = watch.cpu_seconds();
     return run;
   };
-  std::vector<std::pair<int, int>> pairs_before;
+  graph::PoseGraph graph_before;
+  std::vector<int> together_before;
   constexpr int kMostRounds = 3;
   for (int round = 1;; ++round) {
     const std::vector<refine::View> remaining = chosen(views, left);
     std::vector<graph::PosedSegment> segments;
     for (const refine::View& view : remaining) segments.push_back({view.segment_in_scan, view.model_from_scan});
     ASBUILT_TRY(graph, graph::build_graph(segments, scene.prepared, graph_options, context));
-    std::vector<std::pair<int, int>> pairs = linked_pairs(graph);
-    if (round > 2 && pairs == pairs_before) return timed();  // nothing that the last round did not have
-    pairs_before = std::move(pairs);
+    if (round > 2 && graph::links_alike(graph, graph_before)) return timed();
+    graph_before = graph;
     const std::vector<int>& members = graph.components.front();
-    const std::vector<refine::View> together = chosen(remaining, members);
+    std::vector<refine::View> together = chosen(remaining, members);
+    if (members != std::exchange(together_before, members)) {
+      for (refine::View& view : together) view.earlier = {};
+    }
     const std::vector<refine::Link> links = links_among(graph, members);
     ASBUILT_TRY(refinement, refine::refine_on_model(together, links, *scene.prepared.surface, scene.diameter_mm(),
                                                     options, context));
@@ -126,6 +122,7 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
       run.dropped.push_back(left[static_cast<std::size_t>(at)]);
       left.erase(left.begin() + at);
       views = start;
+      together_before.clear();
       round = 0;
       continue;
     }
@@ -135,6 +132,8 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
       run.members.push_back(view);
       run.poses[static_cast<std::size_t>(view)] = refinement.model_from_scan[i];
       views[static_cast<std::size_t>(view)].model_from_scan = refinement.model_from_scan[i];
+      // One that has gone astray must find its way back from afar.
+      views[static_cast<std::size_t>(view)].earlier = suspect ? refine::HandedOn{} : refinement.handed_on[i];
     }
     run.links = links.size();
     run.refinement = refinement;

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
+#include <vector>
 
 namespace asbuilt::graph {
 namespace {
@@ -76,6 +79,20 @@ Result<PoseGraph> build_graph(std::span<const PosedSegment> segments, const mode
     context.report_progress(static_cast<double>(i + 1) / static_cast<double>(segments.size()));
   }
   return builder.graph();
+}
+
+bool links_alike(const PoseGraph& a, const PoseGraph& b) {
+  constexpr std::size_t kOneIn = 50;
+  const auto pairs = [](const PoseGraph& graph) {
+    std::vector<std::pair<int, int>> all;
+    for (const PairOverlap& edge : graph.edges) all.emplace_back(edge.first, edge.second);
+    std::ranges::sort(all);
+    return all;
+  };
+  const std::vector<std::pair<int, int>> first = pairs(a), second = pairs(b);
+  std::vector<std::pair<int, int>> of_one;
+  std::ranges::set_symmetric_difference(first, second, std::back_inserter(of_one));
+  return a.components == b.components && kOneIn * of_one.size() <= first.size() + second.size();
 }
 
 PairOverlap best_missing_link(const PoseGraph& graph) {

@@ -73,6 +73,11 @@ class PoseGraphBuilder {
 [[nodiscard]] Result<PoseGraph> build_graph(std::span<const PosedSegment> segments, const model::PreparedModel& model,
                                             const PoseGraphOptions& options, const Context& context);
 
+/// Whether two graphs of the same scans have the same components and, but for one in fifty, the same links, so that a
+/// refinement under one has nothing to add to that under the other. In a dense network the cap on the links of a scan
+/// hardly ever chooses quite alike twice.
+[[nodiscard]] bool links_alike(const PoseGraph& a, const PoseGraph& b);
+
 /// The pair of scans from different components with the greatest overlap: the link that is missing most.
 /// overlap = 0 with first = second = -1 when there is none (a connected graph, or components that share nothing).
 [[nodiscard]] PairOverlap best_missing_link(const PoseGraph& graph);

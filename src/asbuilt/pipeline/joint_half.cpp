@@ -31,14 +31,17 @@ void drop(std::vector<PosedScan>& scans, const Contradiction& contradiction, io:
   scans.erase(position);
 }
 
-bool same_links(const graph::PoseGraph& a, const graph::PoseGraph& b) {
-  const auto pairs = [](const graph::PoseGraph& graph) {
-    std::vector<std::pair<int, int>> all;
-    for (const graph::PairOverlap& edge : graph.edges) all.emplace_back(edge.first, edge.second);
-    std::ranges::sort(all);
-    return all;
-  };
-  return pairs(a) == pairs(b);
+/// Lets the next refinement go on where this one ended.
+void start_as_refined(Registration& registration, bool contradicted) {
+  for (PosedScan& scan : registration.scans) scan.model_from_local_start = scan.model_from_local;
+  for (const RefinedComponent& component : registration.components) {
+    for (std::size_t i = 0; i < component.members.size(); ++i) {
+      PosedScan& scan = registration.scans[static_cast<std::size_t>(component.members[i])];
+      // One that has gone astray must find its way back from afar.
+      const bool astray = contradicted || component.refinement.handed_on.empty();
+      scan.earlier = astray ? refine::HandedOn{} : component.refinement.handed_on[i];
+    }
+  }
 }
 
 Result<graph::PoseGraph> linked(const std::vector<PosedScan>& scans, const LoadedModel& model, const Options& options,
@@ -112,10 +115,13 @@ Result<void> settle(Registration& registration, const LoadedModel& model, const 
       }
     }
     if (round < kMostRounds) {
-      for (PosedScan& scan : scans) scan.model_from_local_start = scan.model_from_local;
+      start_as_refined(registration, contradiction.has_value());
       ASBUILT_TRY(graph, linked(scans, model, options, folder, context));
-      const bool same = same_links(graph, registration.graph);
-      if (round == 1 || !same) {
+      // Scans that were not refined together stand to one another as they were found.
+      if (graph.components != registration.graph.components) {
+        for (PosedScan& scan : scans) scan.earlier = {};
+      }
+      if (round == 1 || !graph::links_alike(graph, registration.graph)) {
         registration.graph = std::move(graph);
         continue;
       }

@@ -73,6 +73,7 @@ std::vector<refine::View> views_of(const std::vector<int>& members, const std::v
     if (scan.taken_from.empty()) views.back().beside_occluder = scan.beside_occluder;
     views.back().spacing_mm = scan.spacing_mm;
     views.back().sample = scan.sample;
+    views.back().earlier = scan.earlier;
   }
   return views;
 }
@@ -112,6 +113,7 @@ Result<void> start_as_detected(std::vector<PosedScan>& scans, const LoadedModel&
     const refine::View view{scan.part, scan.model_from_local_detected, scan.noise_sigma_mm, scan.viewpoint};
     ASBUILT_TRY(start, refine::start_near_model(view, *model.prepared.surface, model.prepared.diameter, context));
     scan.model_from_local_start = start;
+    scan.earlier = {};
   }
   return {};
 }

@@ -33,6 +33,7 @@ struct PosedScan {
   Pose model_from_local_detected = Pose::Identity();  ///< for those coordinates
   Pose model_from_local_start = Pose::Identity();     ///< where the next refinement starts: detected, or refined before
   Pose model_from_local = Pose::Identity();           ///< refined, once it is
+  refine::HandedOn earlier;  ///< where the next refinement goes on from the last
   Matrix6d covariance = Matrix6d::Zero();
   refine::ViewHold hold;  ///< in the model frame
   double noise_sigma_mm = 0.0, spacing_mm = 0.0;

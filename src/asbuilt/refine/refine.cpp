@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "asbuilt/core/disjoint_sets.h"
@@ -66,6 +67,7 @@ Result<void> check_view(const View& view, std::size_t index) {
 // Links with first < second, in the order of the input, each once. The graph must hold together.
 Result<std::vector<Link>> check_links(std::span<const Link> links, int views) {
   std::vector<Link> unique;
+  std::set<std::pair<int, int>> known;
   DisjointSets linked(views);
   for (const Link& link : links) {
     const bool exists = link.first >= 0 && link.second >= 0 && link.first < views && link.second < views;
@@ -73,10 +75,8 @@ Result<std::vector<Link>> check_links(std::span<const Link> links, int views) {
       return fail(ErrorCode::invalid_argument,
                   fmt::format("link {} - {} among {} views is impossible", link.first, link.second, views));
     }
-    const Link ordered{std::min(link.first, link.second), std::max(link.first, link.second)};
-    const bool known = std::ranges::any_of(
-        unique, [&](const Link& other) { return other.first == ordered.first && other.second == ordered.second; });
-    if (!known) unique.push_back(ordered);
+    const auto [low, high] = std::minmax(link.first, link.second);
+    if (known.emplace(low, high).second) unique.push_back({low, high});
     linked.unite(link.first, link.second);
   }
   if (linked.count() > 1) {
@@ -124,7 +124,7 @@ class JointRefinement {
     for (const View& view : views) poses_.push_back(view.model_from_scan);
     if (!on_model.empty()) start_on_model(on_model);
     measure();
-    make_edges();
+    make_edges(views);
     make_model_holds(on_model);
   }
 
@@ -137,6 +137,11 @@ class JointRefinement {
     result.converged = edges_.empty() || result.converged;
     if (result.covariance.empty()) result.covariance.assign(poses_.size(), Matrix6d::Zero());
     result.model_from_scan = poses_;
+    if (!edges_.empty()) result.handed_on.assign(poses_.size(), {0.0, rim_weight_});
+    for (const DirectedEdge& edge : edges_) {
+      double& reach = result.handed_on[static_cast<std::size_t>(edge.source)].reach_mm;
+      reach = std::max(reach, edge.reach_mm);
+    }
     return result;
   }
 
@@ -177,13 +182,18 @@ class JointRefinement {
     if (!(scaling_.length_mm > 0.0)) scaling_.length_mm = 1.0;
   }
 
-  void make_edges() {
+  void make_edges(std::span<const View> views) {
+    starts_near_ = options_.anneal && !moved_on_model_ &&
+                   std::ranges::all_of(views, [](const View& view) { return view.earlier.reach_mm > 0.0; });
+    const auto reach_of = [&](int v) { return views[static_cast<std::size_t>(v)].earlier.reach_mm; };
+    if (starts_near_) raise_rims(views.front().earlier.rim_weight);
     for (const Link& link : links_) {
       for (const auto& [from, to] : {std::pair(link.first, link.second), std::pair(link.second, link.first)}) {
         DirectedEdge edge;
         edge.source = from;
         edge.target = to;
         edge.reach_mm = start_reach();
+        if (starts_near_) edge.reach_mm = std::min(edge.reach_mm, std::max(reach_of(from), reach_of(to)));
         edges_.push_back(edge);
         edge.of_rims = true;
         if (options_.rim_matches) rim_edges_.push_back(edge);
@@ -193,6 +203,7 @@ class JointRefinement {
 
   // As the fits lie to one another; the fixed view stays where it was.
   void start_on_model(std::span<const ModelFit> on_model) {
+    moved_on_model_ = true;
     const auto fixed = static_cast<std::size_t>(fixed_);
     model_motion_ = poses_[fixed] * on_model[fixed].model_from_scan.inverse(Eigen::Isometry);
     for (std::size_t v = 0; v < poses_.size(); ++v) {
@@ -304,7 +315,13 @@ class JointRefinement {
     if (std::min(sums.beside, sums.inside) < kEnoughOfRims || !(usual_scale_ > 0.0)) return false;
     const double bias_mm =
         sums.beside_mm / static_cast<double>(sums.beside) - sums.inside_mm / static_cast<double>(sums.inside);
-    const auto weight = static_cast<float>(1.0 / (1.0 + squared(bias_mm / (kRimBias * usual_scale_))));
+    return raise_rims(static_cast<float>(1.0 / (1.0 + squared(bias_mm / (kRimBias * usual_scale_)))));
+  }
+
+  // Gives whether any point at a rim counted less before.
+  bool raise_rims(float weight) {
+    rims_weighed_ = true;
+    rim_weight_ = weight;
     bool changed = false;
     for (SampledView& view : views_) {
       for (std::size_t i = 0; i < view.near_rim.size(); ++i) {
@@ -493,9 +510,10 @@ class JointRefinement {
   }
 
   Result<void> descend(Refinement& result) {
-    const bool has_coarse = options_.coarse_to_fine && std::ranges::any_of(views_, [](const SampledView& view) {
-                              return view.points.size() > 2 * view.coarse.size();
-                            });
+    const bool has_coarse =
+        options_.coarse_to_fine && !starts_near_ && std::ranges::any_of(views_, [](const SampledView& view) {
+          return view.points.size() > 2 * view.coarse.size();
+        });
     damping_ = options_.paper_mode ? 1e-3 : 1e-6;
     bool coarse = has_coarse, afresh = true;
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
@@ -723,6 +741,9 @@ class JointRefinement {
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
   double damping_ = 0.0;
   bool rims_weighed_ = false;  // by what is seen of them
+  float rim_weight_ = 0.0F;    // what they count then
+  bool moved_on_model_ = false;
+  bool starts_near_ = false;  // where an earlier refinement ended
 };
 
 }  // namespace

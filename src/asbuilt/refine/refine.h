@@ -17,6 +17,12 @@ namespace asbuilt::refine {
 
 struct SampledView;
 
+/// What a refinement hands on to the next one of the same views from the poses where it ended.
+struct HandedOn {
+  double reach_mm = 0.0;    ///< how far the view's correspondences were searched at last; 0: there was none before
+  float rim_weight = 0.0F;  ///< what points at the rims of scans count, as was seen of them
+};
+
 /// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
 struct View {
   PointCloud segment_in_scan;
@@ -26,6 +32,8 @@ struct View {
   std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
   double spacing_mm = 0.0;  ///< of the scan's points; 0: unknown. Two scans agree no better than a tenth of it
   std::shared_ptr<const SampledView> sample{};  ///< of this very segment (sample_views); none: made when it is needed
+  /// If all views have a reach, correspondences are searched no further, and on full samples, from the start.
+  HandedOn earlier{};
 };
 
 /// Where one scan's own points fit the CAD best, and how well they hold it there.
@@ -126,6 +134,7 @@ struct Refinement {
   bool on_model = false;             ///< the CAD had a say
   std::vector<LinkHold> link_holds;  ///< one a link, in the order of the links
   std::vector<ViewHold> view_holds;  ///< one a view; empty without links
+  std::vector<HandedOn> handed_on;   ///< one a view; empty without links
 };
 
 /// Samples the views that have no sample yet, or one of other rules. Refinements of the same segments that follow need

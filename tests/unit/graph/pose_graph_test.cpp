@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "property/graph/sphere_views.h"
@@ -75,6 +76,28 @@ TEST(PoseGraph, BadInputIsRefusedAndLeavesTheGraphAsItWas) {
   options.voxel_ratio = 0.0;
   EXPECT_FALSE(PoseGraphBuilder::create(sphere_model(), options));
   EXPECT_FALSE(PoseGraphBuilder::create(model::PreparedModel{}, {}));
+}
+
+TEST(PoseGraph, IsAlikeWithTheSamePiecesAndAllButOneInFiftyLinks) {
+  PoseGraph all;
+  for (int scan = 0; scan < 11; ++scan) {
+    for (int other = scan + 1; other < 11; ++other) all.edges.push_back({scan, other, 0.5});
+  }
+  all.components = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}};
+  ASSERT_EQ(all.edges.size(), 55U);
+  EXPECT_TRUE(links_alike(all, all));
+  PoseGraph reversed = all;
+  std::ranges::reverse(reversed.edges);
+  EXPECT_TRUE(links_alike(all, reversed));
+  PoseGraph fewer = all;
+  fewer.edges.resize(53);  // 2 of 108 only in one
+  EXPECT_TRUE(links_alike(all, fewer));
+  EXPECT_TRUE(links_alike(fewer, all));
+  fewer.edges.resize(52);
+  EXPECT_FALSE(links_alike(all, fewer));
+  PoseGraph pieces = all;
+  pieces.components = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}, {10}};
+  EXPECT_FALSE(links_alike(all, pieces));
 }
 
 }  // namespace

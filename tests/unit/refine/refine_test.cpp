@@ -178,6 +178,35 @@ TEST(Refine, PerfectDataAreRefinedWithoutNoiseToMeasureBy) {
   EXPECT_LT(test::relative_pose_error(scene, result.model_from_scan), 0.02);
 }
 
+TEST(Refine, GoesOnFromAnEarlierRefinementInFewerStepsToTheSamePoses) {
+  const test::Scene scene = test::bumpy_scene({}, 3);
+  const Refinement first = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  ASSERT_EQ(first.handed_on.size(), scene.views.size());
+  std::vector<View> refined = scene.views;
+  for (std::size_t v = 0; v < refined.size(); ++v) refined[v].model_from_scan = first.model_from_scan[v];
+  const Refinement cold = refine::refine(refined, scene.links, {}, Context(2)).value();
+  for (std::size_t v = 0; v < refined.size(); ++v) {
+    EXPECT_GT(first.handed_on[v].reach_mm, 0.0);
+    refined[v].earlier = first.handed_on[v];
+  }
+  const Refinement again = refine::refine(refined, scene.links, {}, Context(2)).value();
+  EXPECT_TRUE(again.converged);
+  EXPECT_LT(again.iterations, cold.iterations);
+  EXPECT_LT(again.iterations, first.iterations);
+  EXPECT_LT(test::relative_pose_error(scene, again.model_from_scan),
+            test::relative_pose_error(scene, cold.model_from_scan) + 0.05);
+}
+
+TEST(Refine, AViewThatNothingWasHandedOnToIsLookedForFromAfar) {
+  test::Scene scene = test::bumpy_scene({}, 3);
+  const Refinement expected = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  for (std::size_t v = 1; v < scene.views.size(); ++v) scene.views[v].earlier = {0.1, 1.0F};
+  const Refinement result = refine::refine(scene.views, scene.links, {}, Context(2)).value();
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    EXPECT_EQ(result.model_from_scan[v].matrix(), expected.model_from_scan[v].matrix()) << v;
+  }
+}
+
 TEST(Refine, LinksThatLeavePiecesAreNotPossible) {
   const test::Scene scene = test::bumpy_scene({}, 1);
   const auto result = refine::refine(scene.views, std::vector<Link>{{0, 1}, {2, 3}}, {}, Context(1));
