@@ -137,7 +137,7 @@ class JointRefinement {
     result.converged = edges_.empty() || result.converged;
     if (result.covariance.empty()) result.covariance.assign(poses_.size(), Matrix6d::Zero());
     result.model_from_scan = poses_;
-    if (!edges_.empty()) result.handed_on.assign(poses_.size(), {0.0, rim_weight_});
+    if (!edges_.empty()) result.handed_on.resize(poses_.size());
     for (const DirectedEdge& edge : edges_) {
       double& reach = result.handed_on[static_cast<std::size_t>(edge.source)].reach_mm;
       reach = std::max(reach, edge.reach_mm);
@@ -183,17 +183,16 @@ class JointRefinement {
   }
 
   void make_edges(std::span<const View> views) {
-    starts_near_ = options_.anneal && !moved_on_model_ &&
-                   std::ranges::all_of(views, [](const View& view) { return view.earlier.reach_mm > 0.0; });
+    const bool starts_near = options_.anneal && !moved_on_model_ &&
+                             std::ranges::all_of(views, [](const View& view) { return view.earlier.reach_mm > 0.0; });
     const auto reach_of = [&](int v) { return views[static_cast<std::size_t>(v)].earlier.reach_mm; };
-    if (starts_near_) raise_rims(views.front().earlier.rim_weight);
     for (const Link& link : links_) {
       for (const auto& [from, to] : {std::pair(link.first, link.second), std::pair(link.second, link.first)}) {
         DirectedEdge edge;
         edge.source = from;
         edge.target = to;
         edge.reach_mm = start_reach();
-        if (starts_near_) edge.reach_mm = std::min(edge.reach_mm, std::max(reach_of(from), reach_of(to)));
+        if (starts_near) edge.reach_mm = std::min(edge.reach_mm, std::max(reach_of(from), reach_of(to)));
         edges_.push_back(edge);
         edge.of_rims = true;
         if (options_.rim_matches) rim_edges_.push_back(edge);
@@ -315,13 +314,7 @@ class JointRefinement {
     if (std::min(sums.beside, sums.inside) < kEnoughOfRims || !(usual_scale_ > 0.0)) return false;
     const double bias_mm =
         sums.beside_mm / static_cast<double>(sums.beside) - sums.inside_mm / static_cast<double>(sums.inside);
-    return raise_rims(static_cast<float>(1.0 / (1.0 + squared(bias_mm / (kRimBias * usual_scale_)))));
-  }
-
-  // Gives whether any point at a rim counted less before.
-  bool raise_rims(float weight) {
-    rims_weighed_ = true;
-    rim_weight_ = weight;
+    const auto weight = static_cast<float>(1.0 / (1.0 + squared(bias_mm / (kRimBias * usual_scale_))));
     bool changed = false;
     for (SampledView& view : views_) {
       for (std::size_t i = 0; i < view.near_rim.size(); ++i) {
@@ -510,10 +503,9 @@ class JointRefinement {
   }
 
   Result<void> descend(Refinement& result) {
-    const bool has_coarse =
-        options_.coarse_to_fine && !starts_near_ && std::ranges::any_of(views_, [](const SampledView& view) {
-          return view.points.size() > 2 * view.coarse.size();
-        });
+    const bool has_coarse = options_.coarse_to_fine && std::ranges::any_of(views_, [](const SampledView& view) {
+                              return view.points.size() > 2 * view.coarse.size();
+                            });
     damping_ = options_.paper_mode ? 1e-3 : 1e-6;
     bool coarse = has_coarse, afresh = true;
     for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
@@ -741,9 +733,7 @@ class JointRefinement {
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
   double damping_ = 0.0;
   bool rims_weighed_ = false;  // by what is seen of them
-  float rim_weight_ = 0.0F;    // what they count then
   bool moved_on_model_ = false;
-  bool starts_near_ = false;  // where an earlier refinement ended
 };
 
 }  // namespace

@@ -19,8 +19,7 @@ struct SampledView;
 
 /// What a refinement hands on to the next one of the same views from the poses where it ended.
 struct HandedOn {
-  double reach_mm = 0.0;    ///< how far the view's correspondences were searched at last; 0: there was none before
-  float rim_weight = 0.0F;  ///< what points at the rims of scans count, as was seen of them
+  double reach_mm = 0.0;  ///< how far the view's correspondences were searched at last; 0: there was none before
 };
 
 /// One scan of a component: its segment (with trustworthy oriented normals) and its starting pose.
@@ -32,7 +31,7 @@ struct View {
   std::vector<std::uint8_t> beside_occluder{};  ///< of each point (scan::Occluders); empty: not known
   double spacing_mm = 0.0;  ///< of the scan's points; 0: unknown. Two scans agree no better than a tenth of it
   std::shared_ptr<const SampledView> sample{};  ///< of this very segment (sample_views); none: made when it is needed
-  /// If all views have a reach, correspondences are searched no further, and on full samples, from the start.
+  /// If all views have a reach, correspondences are searched no further from the start.
   HandedOn earlier{};
 };
 

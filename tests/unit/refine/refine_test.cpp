@@ -200,7 +200,7 @@ TEST(Refine, GoesOnFromAnEarlierRefinementInFewerStepsToTheSamePoses) {
 TEST(Refine, AViewThatNothingWasHandedOnToIsLookedForFromAfar) {
   test::Scene scene = test::bumpy_scene({}, 3);
   const Refinement expected = refine::refine(scene.views, scene.links, {}, Context(2)).value();
-  for (std::size_t v = 1; v < scene.views.size(); ++v) scene.views[v].earlier = {0.1, 1.0F};
+  for (std::size_t v = 1; v < scene.views.size(); ++v) scene.views[v].earlier = {0.1};
   const Refinement result = refine::refine(scene.views, scene.links, {}, Context(2)).value();
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     EXPECT_EQ(result.model_from_scan[v].matrix(), expected.model_from_scan[v].matrix()) << v;
