@@ -99,7 +99,6 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     return run;
   };
   graph::PoseGraph graph_before;
-  std::vector<int> together_before;
   constexpr int kMostRounds = 3;
   for (int round = 1;; ++round) {
     const std::vector<refine::View> remaining = chosen(views, left);
@@ -107,12 +106,12 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
     for (const refine::View& view : remaining) segments.push_back({view.segment_in_scan, view.model_from_scan});
     ASBUILT_TRY(graph, graph::build_graph(segments, scene.prepared, graph_options, context));
     if (round > 2 && graph::links_alike(graph, graph_before)) return timed();
-    graph_before = graph;
     const std::vector<int>& members = graph.components.front();
     std::vector<refine::View> together = chosen(remaining, members);
-    if (members != std::exchange(together_before, members)) {
+    if (graph.components != graph_before.components) {
       for (refine::View& view : together) view.earlier = {};
     }
+    graph_before = graph;
     const std::vector<refine::Link> links = links_among(graph, members);
     ASBUILT_TRY(refinement, refine::refine_on_model(together, links, *scene.prepared.surface, scene.diameter_mm(),
                                                     options, context));
@@ -122,7 +121,6 @@ Result<JointRun> joint_run(const RefinementScene& scene, std::vector<refine::Vie
       run.dropped.push_back(left[static_cast<std::size_t>(at)]);
       left.erase(left.begin() + at);
       views = start;
-      together_before.clear();
       round = 0;
       continue;
     }

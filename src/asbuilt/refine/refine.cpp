@@ -124,8 +124,8 @@ class JointRefinement {
     for (const View& view : views) poses_.push_back(view.model_from_scan);
     if (!on_model.empty()) start_on_model(on_model);
     measure();
-    make_edges(views);
     make_model_holds(on_model);
+    make_edges(views);
   }
 
   Result<Refinement> run() {
@@ -183,7 +183,7 @@ class JointRefinement {
   }
 
   void make_edges(std::span<const View> views) {
-    const bool starts_near = options_.anneal && !moved_on_model_ &&
+    const bool starts_near = options_.anneal && model_holds_.empty() &&
                              std::ranges::all_of(views, [](const View& view) { return view.earlier.reach_mm > 0.0; });
     const auto reach_of = [&](int v) { return views[static_cast<std::size_t>(v)].earlier.reach_mm; };
     for (const Link& link : links_) {
@@ -202,7 +202,6 @@ class JointRefinement {
 
   // As the fits lie to one another; the fixed view stays where it was.
   void start_on_model(std::span<const ModelFit> on_model) {
-    moved_on_model_ = true;
     const auto fixed = static_cast<std::size_t>(fixed_);
     model_motion_ = poses_[fixed] * on_model[fixed].model_from_scan.inverse(Eigen::Isometry);
     for (std::size_t v = 0; v < poses_.size(); ++v) {
@@ -733,7 +732,6 @@ class JointRefinement {
   double usual_scale_ = 0.0;  // median robust scale of the edges: the noise that motion is measured in
   double damping_ = 0.0;
   bool rims_weighed_ = false;  // by what is seen of them
-  bool moved_on_model_ = false;
 };
 
 }  // namespace

@@ -48,15 +48,15 @@ TEST(OverlapProperty, IsTheSharedShareOfTheSmallerCap) {
 TEST(OverlapProperty, OnlineInAnyOrderEqualsBatch) {
   const model::PreparedModel model = sphere_model();
   const Context context(2);
-  constexpr int kInAnyOrder = 7;
+  constexpr int kShuffledScans = 7;
   for (unsigned seed = 0; seed < 5; ++seed) {
     std::vector<PosedSegment> segments;
-    for (int i = 0; i < kInAnyOrder; ++i) {
+    for (int i = 0; i < kShuffledScans; ++i) {
       Random random(seed, "cap", static_cast<std::uint64_t>(i));
       segments.push_back(random_cap(random));
     }
     const PoseGraph batch = build_graph(segments, model, {}, context).value();
-    std::vector<int> order(kInAnyOrder);
+    std::vector<int> order(kShuffledScans);
     std::iota(order.begin(), order.end(), 0);
     std::mt19937 shuffler(seed);
     std::ranges::shuffle(order, shuffler);
@@ -71,7 +71,7 @@ TEST(OverlapProperty, OnlineInAnyOrderEqualsBatch) {
     }
     std::ranges::sort(relabelled, comes_before);
     EXPECT_EQ(relabelled, batch.overlaps) << "seed " << seed;
-    const EdgeSelection decision = select_edges(kInAnyOrder, relabelled).value();
+    const EdgeSelection decision = select_edges(kShuffledScans, relabelled).value();
     EXPECT_EQ(decision.edges, batch.edges);
     EXPECT_EQ(decision.components, batch.components);
   }
