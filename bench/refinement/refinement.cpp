@@ -24,7 +24,8 @@ struct Arguments {
   std::string part = "valve_body";  // of `scale`
   std::vector<std::string> folders, settings;
   std::vector<int> scans{8, 128}, own;
-  std::vector<int> degrees{8, graph::PoseGraphOptions{}.edges.max_degree, 0};
+  std::vector<int> degrees{graph::PoseGraphOptions{}.edges.max_degree, 0};
+  int enough_firm = graph::PoseGraphOptions{}.edges.enough_firm;
   double angle = 0.0, shift = 0.0;
   int seeds = 10, count = 40, first = 0, scenes = 20, points = 60000, threads = 0;
 };
@@ -103,7 +104,7 @@ Result<void> run_scale(const Arguments& args) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("--part {}: expected one of {}", args.part, fmt::join(names, ", ")));
   }
-  ASBUILT_TRY(trials, scale_trials(*part, args.scans, args.degrees, Context(args.threads)));
+  ASBUILT_TRY(trials, scale_trials(*part, args.scans, args.degrees, args.enough_firm, Context(args.threads)));
   return append(args, trials);
 }
 
@@ -208,6 +209,7 @@ int run(int argc, char** argv) {
   scale->add_option("--scans", args.scans);
   scale->add_option("--part", args.part, "one of our own, or of --cad")->capture_default_str();
   scale->add_option("--degrees", args.degrees, "links that a scan may have; 0: all");
+  scale->add_option("--enough-firm", args.enough_firm, "firm links with which it needs no more; 0: up to the cap");
   one->add_option("--set", args.settings, "NAME=NUMBER");
   one->add_option("--angle", args.angle);
   one->add_option("--shift", args.shift);

@@ -277,7 +277,7 @@ Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, 
 }
 
 Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans, std::span<const int> degrees,
-                                        const Context& context) {
+                                        int enough_firm, const Context& context) {
   std::vector<Trial> trials;
   const int most = *std::ranges::max_element(scans);
   simulate::SimulateOptions options;
@@ -299,6 +299,7 @@ Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const i
     }
     graph::PoseGraphOptions graph_options;
     graph_options.edges.max_degree = max_degree;
+    graph_options.edges.enough_firm = enough_firm;
     ASBUILT_TRY(run, joint_run(scene, perturbed(scene, 1.0, 0.01, 0), {}, context, graph_options));
     const std::string variant = max_degree == 0 ? fmt::format("{} scans, all links", count)
                                                 : fmt::format("{} scans, {} links each", count, max_degree);

@@ -69,6 +69,7 @@ struct ScenePart {
 /// links that a scan may have (0: all, up to 128 scans). Of several numbers of scans the smallest runs first and last.
 /// Neither list may be empty.
 [[nodiscard]] Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans,
-                                                      std::span<const int> degrees, const Context& context);
+                                                      std::span<const int> degrees, int enough_firm,
+                                                      const Context& context);
 
 }  // namespace asbuilt::bench

@@ -37,32 +37,48 @@ Result<void> check(int scan_count, std::span<const PairOverlap> overlaps) {
   return {};
 }
 
+constexpr double kFirm = 10.0;  // shared cells that hold the motion held least: some hundred samples of a scan
+
+// The strong pairs of a scan, and those of them that were taken so far.
+struct LinksOfScan {
+  int pairs = 0, taken = 0, firm = 0;
+};
+
 // Which of the strong pairs stay under the cap: one forest after the other, each from the firmest pairs that are left.
-std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong, int max_degree) {
-  std::vector<bool> kept(strong.size(), max_degree == 0);
-  if (max_degree == 0) return kept;
+std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong, const EdgeSelectionOptions& options) {
+  std::vector<bool> kept(strong.size(), options.max_degree == 0);
+  if (options.max_degree == 0) return kept;
   std::vector<std::size_t> waiting(strong.size());
   std::iota(waiting.begin(), waiting.end(), std::size_t{0});
   std::ranges::stable_sort(waiting, std::ranges::greater{}, [&](std::size_t i) { return strong[i].firmness; });
 
-  std::vector<int> degree(static_cast<std::size_t>(scan_count), 0);
-  const auto degree_of = [&](int scan) -> int& { return degree[static_cast<std::size_t>(scan)]; };
-  const auto has_room = [&](const PairOverlap& pair) {
-    return degree_of(pair.first) < max_degree && degree_of(pair.second) < max_degree;
+  std::vector<LinksOfScan> scans(static_cast<std::size_t>(scan_count));
+  for (const PairOverlap& pair : strong) {
+    ++scans[static_cast<std::size_t>(pair.first)].pairs;
+    ++scans[static_cast<std::size_t>(pair.second)].pairs;
+  }
+  const auto has_room = [&](const LinksOfScan& scan) { return scan.taken < options.max_degree; };
+  const auto has_enough = [&](const LinksOfScan& scan) {
+    return options.enough_firm > 0 && scan.pairs > options.max_degree && scan.firm >= options.enough_firm;
   };
   for (bool first = true; !waiting.empty(); first = false) {
     DisjointSets forest(scan_count);
     std::vector<std::size_t> left;
     for (const std::size_t i : waiting) {
       const PairOverlap& pair = strong[i];
-      if (!first && !has_room(pair)) continue;  // room never comes back
+      LinksOfScan& one = scans[static_cast<std::size_t>(pair.first)];
+      LinksOfScan& other = scans[static_cast<std::size_t>(pair.second)];
+      const bool wanted = has_room(one) && has_room(other) && !(has_enough(one) && has_enough(other));
+      if (!first && !wanted) continue;  // nor will it ever be
       if (!forest.unite(pair.first, pair.second)) {
         left.push_back(i);
         continue;
       }
       kept[i] = true;
-      ++degree_of(pair.first);
-      ++degree_of(pair.second);
+      for (LinksOfScan* scan : {&one, &other}) {
+        ++scan->taken;
+        if (pair.firmness >= kFirm) ++scan->firm;
+      }
     }
     waiting = std::move(left);
   }
@@ -83,6 +99,9 @@ Result<void> EdgeSelectionOptions::validate() const {
   if (max_degree < 0) {
     return fail(ErrorCode::invalid_argument, fmt::format("max_degree = {} must not be negative", max_degree));
   }
+  if (enough_firm < 0) {
+    return fail(ErrorCode::invalid_argument, fmt::format("enough_firm = {} must not be negative", enough_firm));
+  }
   return {};
 }
 
@@ -97,8 +116,9 @@ Result<EdgeSelection> select_edges(int scan_count, std::span<const PairOverlap> 
   const std::span<const PairOverlap> strong(ranked.begin(), strong_end);
 
   EdgeSelection selection;
+  selection.candidates.assign(strong.begin(), strong.end());
   DisjointSets linked(scan_count);
-  const std::vector<bool> kept = under_cap(scan_count, strong, options.max_degree);
+  const std::vector<bool> kept = under_cap(scan_count, strong, options);
   for (std::size_t i = 0; i < strong.size(); ++i) {
     if (!kept[i]) continue;
     linked.unite(strong[i].first, strong[i].second);

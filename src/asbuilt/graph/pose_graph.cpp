@@ -66,6 +66,7 @@ PoseGraph PoseGraphBuilder::graph() const {
   PoseGraph graph;
   graph.overlaps = histogram_.bars();
   EdgeSelection selection = select_edges(scan_count(), graph.overlaps, selection_).value();
+  graph.candidates = std::move(selection.candidates);
   graph.edges = std::move(selection.edges);
   graph.components = std::move(selection.components);
   return graph;
@@ -85,8 +86,11 @@ bool links_alike(const PoseGraph& a, const PoseGraph& b) {
   constexpr std::size_t kOneIn = 50;
   const auto pairs = [](const PoseGraph& graph) {
     std::vector<std::pair<int, int>> all;
-    for (const PairOverlap& edge : graph.edges) all.emplace_back(edge.first, edge.second);
+    for (const std::vector<PairOverlap>* some : {&graph.candidates, &graph.edges}) {
+      for (const PairOverlap& pair : *some) all.emplace_back(pair.first, pair.second);
+    }
     std::ranges::sort(all);
+    all.erase(std::ranges::unique(all).begin(), all.end());
     return all;
   };
   const std::vector<std::pair<int, int>> first = pairs(a), second = pairs(b);

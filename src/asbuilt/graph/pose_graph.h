@@ -39,6 +39,7 @@ void for_each_field(PoseGraphOptions& options, Visitor&& field) {
 /// Nodes are the given segments, by index.
 struct PoseGraph {
   std::vector<PairOverlap> overlaps;         ///< the histogram of pairwise overlaps, by decreasing overlap
+  std::vector<PairOverlap> candidates;       ///< those that overlap enough to be links, but for the cap on these
   std::vector<PairOverlap> edges;            ///< accepted ones: the paper's A, symmetric
   std::vector<std::vector<int>> components;  ///< largest first
 };
@@ -73,9 +74,9 @@ class PoseGraphBuilder {
 [[nodiscard]] Result<PoseGraph> build_graph(std::span<const PosedSegment> segments, const model::PreparedModel& model,
                                             const PoseGraphOptions& options, const Context& context);
 
-/// Whether two graphs of the same scans have the same components and, but for one in fifty, the same links, so that a
-/// refinement under one has nothing to add to that under the other. In a dense network the cap on the links of a scan
-/// hardly ever chooses quite alike twice.
+/// Whether two graphs of the same scans have the same components and, but for one in fifty, the same pairs that were
+/// links but for the cap, so that a refinement under one has nothing to add to that under the other. Which of them the
+/// cap keeps in a dense network is hardly ever quite alike twice, and matters little.
 [[nodiscard]] bool links_alike(const PoseGraph& a, const PoseGraph& b);
 
 /// The pair of scans from different components with the greatest overlap: the link that is missing most.

@@ -133,6 +133,7 @@ Result<graph::PoseGraph> link(const std::vector<PosedScan>& scans, const LoadedM
   std::vector<graph::PairOverlap> pairs;
   std::ranges::copy_if(graph.overlaps, std::back_inserter(pairs), same);
   ASBUILT_TRY(selection, graph::select_edges(static_cast<int>(scans.size()), pairs, options.graph.edges));
+  graph.candidates = std::move(selection.candidates);
   graph.edges = std::move(selection.edges);
   graph.components = std::move(selection.components);
   return graph;

@@ -16,7 +16,8 @@ std::vector<PairOverlap> overlaps_with_many_ties(std::mt19937& random) {
   std::vector<PairOverlap> overlaps;
   for (int a = 0; a < kScans; ++a) {
     for (int b = a + 1; b < kScans; ++b) {
-      if (random() % 3 == 0) overlaps.push_back({a, b, static_cast<double>(random() % 11) / 20.0});
+      if (random() % 3 != 0) continue;
+      overlaps.push_back({a, b, static_cast<double>(random() % 11) / 20.0, static_cast<double>(random() % 4) * 8.0});
     }
   }
   return overlaps;
@@ -123,6 +124,7 @@ TEST(EdgeSelectionProperty, TheDegreeCapThinsButNeverCuts) {
     options.max_degree = 0;
     const EdgeSelection free = select_edges(kScans, overlaps, options).value();
     options.max_degree = 3;
+    options.enough_firm = static_cast<int>(random() % 3);
     const EdgeSelection capped = select_edges(kScans, overlaps, options).value();
     EXPECT_EQ(capped.components, free.components) << "seed " << seed;
     EXPECT_LE(capped.edges.size(), free.edges.size());

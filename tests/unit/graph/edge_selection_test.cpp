@@ -92,6 +92,57 @@ TEST(EdgeSelection, ByDefaultLinksGrowWithTheScansAndNotWithTheirPairs) {
   EXPECT_LE(links_of(200), 200U * 12U / 2U + 199U) << "the cap, and the forest that takes no notice of it";
 }
 
+// Every pair of `scans` overlaps by a half, with the firmness that `of` gives.
+template <class Firmness>
+std::vector<PairOverlap> all_pairs(int scans, const Firmness& of) {
+  std::vector<PairOverlap> overlaps;
+  for (int a = 0; a < scans; ++a) {
+    for (int b = a + 1; b < scans; ++b) overlaps.push_back({a, b, 0.5, of(a, b)});
+  }
+  return overlaps;
+}
+
+std::vector<int> links_of_each(int scans, const EdgeSelection& selection) {
+  std::vector<int> links(static_cast<std::size_t>(scans), 0);
+  for (const PairOverlap& edge : selection.edges) {
+    ++links[static_cast<std::size_t>(edge.first)];
+    ++links[static_cast<std::size_t>(edge.second)];
+  }
+  return links;
+}
+
+TEST(EdgeSelection, ADenseNetworkOfFirmLinksNeedsFewAndOneOfLooseLinksTheWholeCap) {
+  constexpr int kMany = 60;
+  const auto links_each = [](double firmness) {
+    const auto pairs = all_pairs(kMany, [&](int a, int b) { return firmness / (1.0 + 0.01 * (b - a)); });
+    return 2.0 * static_cast<double>(select_edges(kMany, pairs).value().edges.size()) / kMany;
+  };
+  EXPECT_GE(links_each(100.0), 4.0) << "as many as hold a scan";
+  EXPECT_LE(links_each(100.0), 8.0);
+  EXPECT_GE(links_each(1.0), 11.0);
+  EXPECT_LE(links_each(1.0), 14.0) << "the cap, and the forest that takes no notice of it";
+}
+
+TEST(EdgeSelection, AScanThatNoLinkHoldsFirmlyKeepsMoreAmongScansThatAreHeld) {
+  constexpr int kMany = 40, kLoose = 7;
+  const auto pairs = all_pairs(kMany, [](int a, int b) { return a == kLoose || b == kLoose ? 2.0 : 80.0; });
+  const EdgeSelection selection = select_edges(kMany, pairs).value();
+  EXPECT_EQ(links_of_each(kMany, selection)[kLoose], EdgeSelectionOptions{}.max_degree);
+  EXPECT_LE(selection.edges.size(), 4U * kMany) << "the others stay at some four to eight";
+}
+
+TEST(EdgeSelection, EnoughFirmLinksAreCountedOnlyWhereTheCapIsAtWork) {
+  const auto pairs = all_pairs(13, [](int, int) { return 100.0; });  // 12 pairs a scan: none too many
+  EXPECT_EQ(select_edges(13, pairs).value().edges.size(), pairs.size());
+  EdgeSelectionOptions options;
+  options.enough_firm = 0;
+  const auto many = all_pairs(40, [](int, int) { return 100.0; });
+  EXPECT_GE(select_edges(40, many, options).value().edges.size(), 40U * 11U / 2U) << "0: up to the cap";
+  options.max_degree = 0;
+  options.enough_firm = 4;
+  EXPECT_EQ(select_edges(40, many, options).value().edges.size(), many.size()) << "no cap, no choice";
+}
+
 TEST(EdgeSelection, NothingGivesNothing) {
   const EdgeSelection selection = select_edges(0, {}).value();
   EXPECT_THAT(selection.edges, IsEmpty());
@@ -117,6 +168,7 @@ TEST(EdgeSelection, OptionsOutOfOrderAreRefused) {
   EXPECT_FALSE((EdgeSelectionOptions{0.1, 1.1, 0, true}).validate());
   EXPECT_FALSE((EdgeSelectionOptions{std::numeric_limits<double>::quiet_NaN(), 0.4, 0, true}).validate());
   EXPECT_FALSE((EdgeSelectionOptions{0.1, 0.4, -1, true}).validate());
+  EXPECT_FALSE((EdgeSelectionOptions{0.1, 0.4, 0, true, -1}).validate());
   EXPECT_TRUE(EdgeSelectionOptions{}.validate());
 }
 

@@ -100,5 +100,17 @@ TEST(PoseGraph, IsAlikeWithTheSamePiecesAndAllButOneInFiftyLinks) {
   EXPECT_FALSE(links_alike(all, pieces));
 }
 
+TEST(PoseGraph, LinksThatTheCapMerelyExchangesMakeNoOtherGraph) {
+  PoseGraph one;
+  for (int b = 1; b < 9; ++b) one.candidates.push_back({0, b, 0.5});
+  one.components = {{0, 1, 2, 3, 4, 5, 6, 7, 8}};
+  PoseGraph other = one;
+  one.edges.assign(one.candidates.begin(), one.candidates.begin() + 4);
+  other.edges.assign(one.candidates.begin() + 4, one.candidates.end());
+  EXPECT_TRUE(links_alike(one, other)) << "the same pairs to choose from";
+  other.candidates = other.edges;  // now the others no longer overlap enough
+  EXPECT_FALSE(links_alike(one, other));
+}
+
 }  // namespace
 }  // namespace asbuilt::graph
