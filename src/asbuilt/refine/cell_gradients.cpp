@@ -56,13 +56,16 @@ std::vector<CellGradient> cell_gradients(std::span<const DirectedEdge> edges, st
       const DirectedEdge& edge = edges[2 * l + (there ? 0 : 1)];
       const EdgeResidualFunction residual_of(edge, views, poses, scaling.origin, symmetric);
       const TukeyLoss loss{edge.scale_mm};
-      for (const Match& match : edge.matches) {
-        ResidualWithJacobian r = residual_of(match);
-        r.jacobian.head<3>() /= scaling.length_mm;
-        const double weight = edge.weight * static_cast<double>(match.weight) * loss.weight(r.residual * r.residual);
+      for (std::size_t i = 0; i < edge.matches.size(); ++i) {
+        residual_of.fetch_ahead(i);
+        ResidualWithJacobian r = residual_of(i);
+        const double weight =
+            edge.weight * static_cast<double>(edge.matches[i].weight) * loss.weight(r.residual * r.residual);
         if (weight <= 0.0) continue;
-        gradients.push_back(
-            {cube_of(residual_of.position(match), cell_mm), (there ? weight : -weight) * r.residual * r.jacobian});
+        r.jacobian.head<3>() = residual_of.rotation() * r.jacobian.head<3>() / scaling.length_mm;
+        r.jacobian.tail<3>() = residual_of.rotation() * r.jacobian.tail<3>();
+        gradients.push_back({cube_of(residual_of.rotation() * residual_of.position(i), cell_mm),
+                             (there ? weight : -weight) * r.residual * r.jacobian});
       }
     }
     of_link[l] = merged(std::move(gradients));

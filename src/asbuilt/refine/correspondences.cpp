@@ -12,6 +12,7 @@ namespace asbuilt::refine {
 namespace {
 
 constexpr std::size_t kBlock = 1024;
+constexpr std::size_t kTogether = 1 << 18;  // searches: enough for many threads, few enough to stay near the cores
 
 double squared(double x) { return x * x; }
 
@@ -120,8 +121,33 @@ void keep_companions(std::vector<Match>& matches, const PointCloud& target) {
   std::erase_if(matches, [&](const Match& match) { return face_of(match)->count < kLeastTogether; });
 }
 
-struct Task {
-  std::size_t edge, begin, end;
+/// The points of some edges that look for a match, one edge after the other.
+struct Searches {
+  struct Range {
+    std::size_t edge, begin, count;
+  };
+  std::vector<Match> found;    ///< so far the targets of the last search, with no weight
+  std::vector<Range> of_edge;  ///< for each edge
+  std::vector<Range> blocks;   ///< the same in pieces
+
+  void clear() {
+    found.clear();
+    of_edge.clear();
+    blocks.clear();
+  }
+
+  void add(std::size_t e, const DirectedEdge& edge, const SampledView& from, bool coarse) {
+    const std::size_t count = searchers(from, coarse), first = found.size();
+    auto earlier = edge.matches.begin();  // by increasing source, as what follows
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t source = coarse ? from.coarse[i] : static_cast<std::uint32_t>(i);
+      while (earlier != edge.matches.end() && earlier->source < source) ++earlier;
+      const bool known = earlier != edge.matches.end() && earlier->source == source;
+      found.push_back({source, known ? earlier->target : KdTree::kNone, 0.0F});
+    }
+    of_edge.push_back({e, first, count});
+    for (std::size_t i = 0; i < count; i += kBlock) blocks.push_back({e, first + i, std::min(kBlock, count - i)});
+  }
 };
 
 // What may_keep() asks the next time.
@@ -143,43 +169,36 @@ std::size_t find_matches(std::vector<DirectedEdge>& edges, std::span<const Sampl
     note_search(edges[e], now, rules);
     due.push_back(e);
   }
-  std::vector<std::vector<Match>> found(edges.size());
-  std::vector<Task> tasks;
-  for (const std::size_t e : due) {
-    const std::size_t count = searchers(view_at(views, edges[e].source), rules.coarse);
-    found[e].resize(count);
-    const SampledView& from = view_at(views, edges[e].source);
-    auto earlier = edges[e].matches.begin();  // by increasing source, as what follows
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t source = rules.coarse ? from.coarse[i] : static_cast<std::uint32_t>(i);
-      while (earlier != edges[e].matches.end() && earlier->source < source) ++earlier;
-      const bool known = earlier != edges[e].matches.end() && earlier->source == source;
-      found[e][i] = {source, known ? earlier->target : KdTree::kNone, 0.0F};
+  // Some edges after the other, so that what is found of them takes the same memory each time.
+  Searches searches;
+  for (std::size_t d = 0; d < due.size();) {
+    searches.clear();
+    for (; d < due.size() && searches.found.size() < kTogether; ++d) {
+      const DirectedEdge& edge = edges[due[d]];
+      searches.add(due[d], edge, view_at(views, edge.source), rules.coarse);
     }
-    for (std::size_t i = 0; i < count; i += kBlock) tasks.push_back({e, i, std::min(count, i + kBlock)});
+    parallel_for(context, searches.blocks.size(), 1, [&](std::size_t b) {
+      if (context.cancelled()) return;
+      const Searches::Range& block = searches.blocks[b];
+      const DirectedEdge& edge = edges[block.edge];
+      const SampledView& from = view_at(views, edge.source);
+      const SampledView& to = view_at(views, edge.target);
+      for (Match& match : std::span(searches.found).subspan(block.begin, block.count)) {
+        match.target = match_of(match.source, match.target, from, to, edge.target_from_source, edge.reach_mm, rules);
+        if (match.target == KdTree::kNone) continue;
+        match.weight = weight_of(match.source, match.target, from, to, edge.target_from_source, rules);
+      }
+    });
+    parallel_for(context, searches.of_edge.size(), 1, [&](std::size_t i) {
+      const Searches::Range& all = searches.of_edge[i];
+      std::vector<Match>& matches = edges[all.edge].matches;
+      matches.clear();
+      for (const Match& match : std::span(searches.found).subspan(all.begin, all.count)) {
+        // Also where the search was cut short: nothing there has a weight.
+        if (match.weight > 0.0F && match.target != KdTree::kNone) matches.push_back(match);
+      }
+    });
   }
-  parallel_for(context, tasks.size(), 1, [&](std::size_t t) {
-    if (context.cancelled()) return;
-    const Task& task = tasks[t];
-    const DirectedEdge& edge = edges[task.edge];
-    const SampledView& from = view_at(views, edge.source);
-    const SampledView& to = view_at(views, edge.target);
-    for (std::size_t i = task.begin; i < task.end; ++i) {
-      const auto [source, before, nothing] = found[task.edge][i];
-      const std::uint32_t target = match_of(source, before, from, to, edge.target_from_source, edge.reach_mm, rules);
-      const bool matched = target != KdTree::kNone;
-      found[task.edge][i] = {source, target,
-                             matched ? weight_of(source, target, from, to, edge.target_from_source, rules) : 0.0F};
-    }
-  });
-  parallel_for(context, due.size(), 1, [&](std::size_t d) {
-    std::vector<Match>& matches = edges[due[d]].matches;
-    matches.clear();
-    for (const Match& match : found[due[d]]) {
-      // Also where the search was cut short: nothing there has a weight.
-      if (match.weight > 0.0F && match.target != KdTree::kNone) matches.push_back(match);
-    }
-  });
   return due.size();
 }
 
@@ -216,6 +235,8 @@ ResidualStatistics residual_statistics(const DirectedEdge& edge, std::span<const
   // Medians of a few thousand are as good as those of all.
   constexpr std::size_t kEnough = 4000;
   const std::size_t stride = (edge.matches.size() + kEnough - 1) / kEnough;
+  residuals.reserve(edge.matches.size() / stride + 1);
+  sines.reserve(edge.matches.size() / stride + 1);
   for (std::size_t m = 0; m < edge.matches.size(); m += stride) {
     const Match& match = edge.matches[m];
     const Eigen::Vector3d p = to_from_from * from.points.positions[match.source].cast<double>();

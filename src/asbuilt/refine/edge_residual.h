@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <span>
 
 #include "asbuilt/core/pose.h"
@@ -9,38 +11,69 @@
 
 namespace asbuilt::refine {
 
-/// The residual of a match, with positions relative to `origin` (which keeps the rotation columns small).
+/// The residual of a match, in the frame of the edge's target with positions relative to `origin_in_common` (which
+/// keeps the rotation columns small). There a match takes one motion instead of three, and the residual is the same
+/// number. What is derived and summed there is turned into the common frame by rotation(), once for all matches.
 class EdgeResidualFunction {
  public:
   EdgeResidualFunction(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
-                       const Eigen::Vector3d& origin, bool symmetric)
+                       const Eigen::Vector3d& origin_in_common, bool symmetric)
       : source_(edge.of_rims ? views[static_cast<std::size_t>(edge.source)].rims.ends
                              : views[static_cast<std::size_t>(edge.source)].points),
         target_(views[static_cast<std::size_t>(edge.target)].points),
-        source_pose_(poses[static_cast<std::size_t>(edge.source)]),
-        target_pose_(poses[static_cast<std::size_t>(edge.target)]),
-        origin_(origin),
-        symmetric_(symmetric && !edge.of_rims) {}
-
-  [[nodiscard]] Eigen::Vector3d position(const Match& match) const {
-    return source_pose_ * source_.positions[match.source].cast<double>() - origin_;
+        matches_(edge.matches),
+        rotation_(poses[static_cast<std::size_t>(edge.target)].linear()),
+        symmetric_(symmetric && !edge.of_rims) {
+    const Pose target_from_common = poses[static_cast<std::size_t>(edge.target)].inverse(Eigen::Isometry);
+    const Pose target_from_source = target_from_common * poses[static_cast<std::size_t>(edge.source)];
+    turn_ = target_from_source.linear();
+    origin_ = target_from_common * origin_in_common;
+    shift_ = target_from_source.translation() - origin_;
   }
 
-  [[nodiscard]] ResidualWithJacobian operator()(const Match& match) const {
-    const Eigen::Vector3d p = position(match);
-    const Eigen::Vector3d q = target_pose_ * target_.positions[match.target].cast<double>() - origin_;
-    const Eigen::Vector3d normal_q = target_pose_.linear() * target_.normals[match.target].cast<double>();
-    if (!symmetric_) return point_to_plane(p, q, normal_q);
-    const Eigen::Vector3d normal_p = source_pose_.linear() * source_.normals[match.source].cast<double>();
-    return symmetric_point_to_plane(p, normal_p, q, normal_q);
+  /// The axes of the target's frame in the common one.
+  [[nodiscard]] const Eigen::Matrix3d& rotation() const { return rotation_; }
+
+  /// The point of the source, from the origin, in the target's frame.
+  [[nodiscard]] Eigen::Vector3d position(std::size_t match) const {
+    return turn_ * source_.positions[matches_[match].source].cast<double>() + shift_;
+  }
+
+  [[nodiscard]] double residual(std::size_t match) const {
+    const Eigen::Vector3d offset = position(match) - target_position(match);
+    if (!symmetric_) return target_normal(match).dot(offset);
+    return 0.5 * (source_normal(match) + target_normal(match)).dot(offset);
+  }
+
+  [[nodiscard]] ResidualWithJacobian operator()(std::size_t match) const {
+    const Eigen::Vector3d p = position(match), q = target_position(match), normal_q = target_normal(match);
+    return symmetric_ ? symmetric_point_to_plane(p, source_normal(match), q, normal_q) : point_to_plane(p, q, normal_q);
+  }
+
+  /// Sources come in their order, targets do not: asked for some matches ahead they are there when it is their turn.
+  void fetch_ahead(std::size_t match) const {
+    constexpr std::size_t kAhead = 16;
+    const std::uint32_t target = matches_[std::min(match + kAhead, matches_.size() - 1)].target;
+    __builtin_prefetch(&target_.positions[target]);
+    __builtin_prefetch(&target_.normals[target]);
   }
 
  private:
+  [[nodiscard]] Eigen::Vector3d target_position(std::size_t match) const {
+    return target_.positions[matches_[match].target].cast<double>() - origin_;
+  }
+  [[nodiscard]] Eigen::Vector3d target_normal(std::size_t match) const {
+    return target_.normals[matches_[match].target].cast<double>();
+  }
+  [[nodiscard]] Eigen::Vector3d source_normal(std::size_t match) const {
+    return turn_ * source_.normals[matches_[match].source].cast<double>();
+  }
+
   const PointCloud& source_;
   const PointCloud& target_;
-  const Pose& source_pose_;
-  const Pose& target_pose_;
-  Eigen::Vector3d origin_;
+  std::span<const Match> matches_;
+  Eigen::Matrix3d rotation_, turn_;
+  Eigen::Vector3d origin_, shift_;  // in the target's frame
   bool symmetric_;
 };
 

@@ -24,6 +24,16 @@ struct Task {
   std::size_t edge, begin, end;
 };
 
+// Into a frame in which the axes of the present one are the columns of `rotation`, with the same origin.
+void turn(EdgeSums& sums, const Eigen::Matrix3d& rotation) {
+  Matrix6d both = Matrix6d::Zero();
+  both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = rotation;
+  const Matrix6d turned = both * sums.information * both.transpose();
+  sums.information = 0.5 * (turned + turned.transpose());
+  sums.gradient = both * sums.gradient;
+  sums.weighted_position = rotation * sums.weighted_position;
+}
+
 std::vector<Task> blocks_of(std::span<const DirectedEdge> edges) {
   std::vector<Task> tasks;
   for (std::size_t e = 0; e < edges.size(); ++e) {
@@ -65,22 +75,24 @@ std::vector<EdgeSums> linearise(std::span<const DirectedEdge> edges, std::span<c
     const TukeyLoss loss{edge.scale_mm};
     EdgeSums sums;
     for (std::size_t i = tasks[t].begin; i < tasks[t].end; ++i) {
-      ResidualWithJacobian r = residual_of(edge.matches[i]);
+      residual_of.fetch_ahead(i);
+      ResidualWithJacobian r = residual_of(i);
       r.jacobian.head<3>() /= scaling.length_mm;
       const double squared = r.residual * r.residual;
       const double match_weight = edge.weight * static_cast<double>(edge.matches[i].weight);
       const double weight = match_weight * loss.weight(squared);
       sums.cost += match_weight * loss.value(squared);
       if (weight <= 0.0) continue;
-      sums.information.selfadjointView<Eigen::Lower>().rankUpdate(r.jacobian, weight);
-      sums.gradient += weight * r.residual * r.jacobian;
+      const Vector6d weighted = weight * r.jacobian;
+      sums.information.noalias() += weighted * r.jacobian.transpose();
+      sums.gradient += r.residual * weighted;
       sums.weight += weight;
       sums.weighted_squares += weight * squared;
-      const Eigen::Vector3d position = residual_of.position(edge.matches[i]);
+      const Eigen::Vector3d position = residual_of.position(i);
       sums.weighted_position += weight * position;
       sums.weighted_square_position += weight * position.squaredNorm();
     }
-    sums.information.triangularView<Eigen::StrictlyUpper>() = sums.information.transpose();
+    turn(sums, residual_of.rotation());
     partial[t] = sums;
   });
   std::vector<EdgeSums> total(edges.size());
@@ -96,7 +108,8 @@ double total_cost(std::span<const DirectedEdge> edges, std::span<const SampledVi
     const EdgeResidualFunction residual_of(edge, views, poses, Eigen::Vector3d::Zero(), symmetric);
     const TukeyLoss loss{edge.scale_mm};
     for (std::size_t i = tasks[t].begin; i < tasks[t].end; ++i) {
-      const double residual = residual_of(edge.matches[i]).residual;
+      residual_of.fetch_ahead(i);
+      const double residual = residual_of.residual(i);
       sum += edge.weight * static_cast<double>(edge.matches[i].weight) * loss.value(residual * residual);
     }
   });
