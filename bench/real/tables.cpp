@@ -16,6 +16,25 @@ std::string number(const Json& object, const char* key, int digits) {
   return fmt::format("{:.{}f}", object.at(key).get<double>(), digits);
 }
 
+// The same of a share, in %.
+std::string percent(const Json& object, const char* key, int digits) {
+  if (!object.contains(key) || !object.at(key).is_number()) return "-";
+  return fmt::format("{:.{}f}", 100.0 * object.at(key).get<double>(), digits);
+}
+
+// The mean over the scans that have it, in %.
+std::string mean_percent(const Json& evaluation, const char* key, int digits) {
+  if (!evaluation.contains("per_scan")) return "-";
+  double sum = 0.0;
+  int count = 0;
+  for (const Json& scan : evaluation.at("per_scan")) {
+    if (!scan.contains(key) || !scan.at(key).is_number()) continue;
+    sum += scan.at(key).get<double>();
+    ++count;
+  }
+  return count > 0 ? fmt::format("{:.{}f}", 100.0 * sum / count, digits) : "-";
+}
+
 std::string real_table(const Json& sets) {
   std::string text =
       "| real scans | accepted | right | wrong | components | worst angle, deg | worst at the centroid, mm | mean "
@@ -45,6 +64,20 @@ std::string simulated_table(const Json& sets) {
   return text;
 }
 
+// The clouds and segments of the same runs.
+std::string reconstruction_table(const Json& sets) {
+  std::string text =
+      "| simulated scans | points beyond 6 sigma, % | the same of true points under true poses, % | completeness, % | "
+      "label precision, mean, % | label recall, mean, % |\n|---|---|---|---|---|---|\n";
+  for (const auto& [name, set] : sets.items()) {
+    const Json& figures = set.at("evaluation");
+    text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", name, percent(figures, "reconstruction_beyond_share", 3),
+                        percent(figures, "oracle_beyond_share", 3), percent(figures, "reconstruction_completeness", 2),
+                        mean_percent(figures, "segment_precision", 2), mean_percent(figures, "segment_recall", 2));
+  }
+  return text;
+}
+
 std::string stage_table(const std::string& name, const Json& timing) {
   std::string text = fmt::format("| {} | seconds | peak memory so far, MB |\n|---|---|---|\n", name);
   for (const Json& stage : timing.at("stages")) {
@@ -59,7 +92,10 @@ std::string stage_table(const std::string& name, const Json& timing) {
 std::string tables(const Json& figures) {
   std::string text;
   if (figures.contains("real")) text += real_table(figures.at("real")) + "\n";
-  if (figures.contains("simulated")) text += simulated_table(figures.at("simulated")) + "\n";
+  if (figures.contains("simulated")) {
+    text += simulated_table(figures.at("simulated")) + "\n";
+    text += reconstruction_table(figures.at("simulated")) + "\n";
+  }
   if (figures.contains("stages")) {
     for (const auto& [name, timing] : figures.at("stages").items()) text += stage_table(name, timing) + "\n";
   }

@@ -47,6 +47,13 @@ std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::
   return links;
 }
 
+// What tells trials of `scale` apart.
+std::string scale_variant(int scans, int max_degree, int enough_firm) {
+  if (max_degree == 0) return fmt::format("{} scans, all links", scans);
+  const std::string text = fmt::format("{} scans, at most {} links each", scans, max_degree);
+  return enough_firm == 0 ? text : fmt::format("{}, {} firm ones enough", text, enough_firm);
+}
+
 Trial trial_of(const char* kind, const RefinementScene& scene, std::string variant, std::uint64_t seed,
                const JointRun& run) {
   Trial trial{kind, scene.name, std::move(variant), seed, {}, {}};
@@ -220,7 +227,6 @@ Result<Trial> wrong_trial(const RefinementScene& scene, int seed, const Context&
   trial.figures["apart"] = separate ? 1.0 : 0.0;  // dropped, or left outside the largest component
   trial.figures["others_dropped"] = static_cast<double>(run.dropped.size()) - (found ? 1.0 : 0.0);
   trial.figures["error_sigma"] = judge.relative_pose_error(run.poses, run.members);
-  RefinementScene rest;
   std::vector<int> others = run.members;
   std::erase(others, static_cast<int>(wrong));
   RefinementScene smaller;
@@ -301,9 +307,7 @@ Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const i
     graph_options.edges.max_degree = max_degree;
     graph_options.edges.enough_firm = enough_firm;
     ASBUILT_TRY(run, joint_run(scene, perturbed(scene, 1.0, 0.01, 0), {}, context, graph_options));
-    const std::string variant = max_degree == 0 ? fmt::format("{} scans, all links", count)
-                                                : fmt::format("{} scans, {} links each", count, max_degree);
-    Trial trial = trial_of("scale", scene, variant, 0, run);
+    Trial trial = trial_of("scale", scene, scale_variant(count, max_degree, enough_firm), 0, run);
     trial.figures["error_sigma"] = AccuracyJudge(scene).relative_pose_error(run.poses, run.members);
     trials.push_back(std::move(trial));
     return {};

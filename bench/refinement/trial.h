@@ -66,8 +66,9 @@ struct ScenePart {
                                                 const Context& context);
 
 /// Many scans of `part`, from 1 degree and 1 % off: time and error against the number of scans, for each number of
-/// links that a scan may have (0: all, up to 128 scans). Of several numbers of scans the smallest runs first and last.
-/// Neither list may be empty.
+/// links that a scan may have (0: all, up to 128 scans). Under such a cap a scan in a dense network needs no further
+/// link once it has `enough_firm` firm ones (0: links up to the cap). Of several numbers of scans the smallest runs
+/// first and last. Neither list may be empty.
 [[nodiscard]] Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans,
                                                       std::span<const int> degrees, int enough_firm,
                                                       const Context& context);

@@ -58,7 +58,7 @@ grep -q '"part": "pass"' report/report.json || fail "the verdict is not pass"
 
 # ---- a graph in pieces: 5, also when it is out of tolerance; each piece is told
 expect 5 register detected -o pieces --graph-low 1 --graph-high 1 --tolerance -0.0001,0.0001
-says disconnected overlap
+says disconnected overlap 'best missing link is scan_0'
 [ "$(grep -c '"status": "disconnected"' pieces/result.json)" -eq 2 ] || fail "two scans should hang loose"
 absent pieces/mesh.ply
 

@@ -37,7 +37,7 @@ Result<void> check(int scan_count, std::span<const PairOverlap> overlaps) {
   return {};
 }
 
-constexpr double kFirm = 10.0;  // shared cells that hold the motion held least: some hundred samples of a scan
+constexpr double kFirm = 10.0;  // shared cells that hold the motion held least
 
 // The strong pairs of a scan, and those of them that were taken so far.
 struct LinksOfScan {
@@ -53,9 +53,11 @@ std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong,
   std::ranges::stable_sort(waiting, std::ranges::greater{}, [&](std::size_t i) { return strong[i].firmness; });
 
   std::vector<LinksOfScan> scans(static_cast<std::size_t>(scan_count));
+  DisjointSets firmly(scan_count);  // groups that firm pairs hold together
   for (const PairOverlap& pair : strong) {
     ++scans[static_cast<std::size_t>(pair.first)].pairs;
     ++scans[static_cast<std::size_t>(pair.second)].pairs;
+    if (pair.firmness >= kFirm) firmly.unite(pair.first, pair.second);
   }
   const auto has_room = [&](const LinksOfScan& scan) { return scan.taken < options.max_degree; };
   const auto has_enough = [&](const LinksOfScan& scan) {
@@ -68,7 +70,10 @@ std::vector<bool> under_cap(int scan_count, std::span<const PairOverlap> strong,
       const PairOverlap& pair = strong[i];
       LinksOfScan& one = scans[static_cast<std::size_t>(pair.first)];
       LinksOfScan& other = scans[static_cast<std::size_t>(pair.second)];
-      const bool wanted = has_room(one) && has_room(other) && !(has_enough(one) && has_enough(other));
+      // Between two groups no pair is firm: as many tie them as the cap allows.
+      const bool needed =
+          !(has_enough(one) && has_enough(other)) || firmly.find(pair.first) != firmly.find(pair.second);
+      const bool wanted = needed && has_room(one) && has_room(other);
       if (!first && !wanted) continue;  // nor will it ever be
       if (!forest.unite(pair.first, pair.second)) {
         left.push_back(i);

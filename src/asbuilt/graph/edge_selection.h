@@ -22,7 +22,7 @@ struct EdgeSelectionOptions {
   double high = 0.10;        ///< alpha_h: a pair at or above it is always linked (likewise; docs/graph.md)
   int max_degree = 12;       ///< strong links a scan keeps in dense networks, firmest first; 0: all (docs/graph.md)
   bool bridges_only = true;  ///< below `high` only a pair that joins two components; paper: any, until connected
-  int enough_firm = 4;       ///< firm links that hold a scan with more pairs than max_degree; 0: none (docs/graph.md)
+  int enough_firm = 4;       ///< firm links that are enough where pairs exceed the cap; 0: never (docs/graph.md)
 
   [[nodiscard]] Result<void> validate() const;  ///< 0 <= low <= high <= 1, max_degree >= 0, enough_firm >= 0
 };
@@ -33,7 +33,7 @@ void for_each_field(EdgeSelectionOptions& options, Visitor&& field) {
   field("high", options.high, "overlap from which they always are");
   field("max_degree", options.max_degree, "links a scan keeps in a dense network (0: all)");
   field("enough_firm", options.enough_firm,
-        "links there that hold every motion, and it needs no more (0: up to the cap)");
+        "firm links with which a scan with more pairs than that needs no more (0: up to the cap)");
 }
 
 struct EdgeSelection {
@@ -48,9 +48,10 @@ struct EdgeSelection {
 /// decreasing order, down to `low`: each that joins two components, or (paper: `bridges_only` off) each at all.
 /// Scans that stay alone form components of their own. With `max_degree`, one spanning forest of strong pairs after the
 /// other is taken, firmest pairs first (ties by overlap, then by index), as long as both scans of a pair have room and
-/// one of them needs it: a scan with more strong pairs than `max_degree` needs no further ones after `enough_firm` that
-/// hold every motion. The first forest takes no notice of that, so components never depend on it; the next ones make
-/// that no few links carry the whole, which the firmest pairs alone, near twins all, would not.
+/// one of them needs it: a scan with more strong pairs than `max_degree` needs no further ones after `enough_firm` firm
+/// ones (ten shared cells hold the motion held least), but to scans that no chain of firm pairs leads to. The first
+/// forest takes no notice of that, so components never depend on it; the next ones make that no few links carry the
+/// whole, which the firmest pairs alone, near twins all, would not.
 ///
 /// Source: Sec. 3.2, Fig. 4 (c) and (d). Cost: O(P (log P + max_degree)) for P pairs.
 /// Errors: invalid_argument if the options fail validate(), or a pair names an unknown scan, comes twice or has no

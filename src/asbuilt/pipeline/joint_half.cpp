@@ -212,6 +212,23 @@ void describe_hold(io::ScanRecord& scan, const refine::ViewHold& hold, const Con
   context.warn(fmt::format("{}: held weakly by the scans that it overlaps: it may {}", scan.path, motions));
 }
 
+/// Of a graph in pieces, the pair between two of them that lacks least to be a link: there one more scan helps most.
+void name_missing_link(const Registration& registration, const io::RunRecord& record, const Options& options,
+                       const Context& context) {
+  const auto scan_of = [&](int scan) -> const PosedScan& { return registration.scans[static_cast<std::size_t>(scan)]; };
+  graph::PoseGraph of_one_individual = registration.graph;
+  std::erase_if(of_one_individual.overlaps, [&](const graph::PairOverlap& pair) {
+    return scan_of(pair.first).individual != scan_of(pair.second).individual;
+  });
+  const graph::PairOverlap missing = graph::best_missing_link(of_one_individual);
+  if (missing.first < 0) return;  // one piece, or pieces that share nothing: each scan says so itself
+  const auto name = [&](int scan) { return record.scans[static_cast<std::size_t>(scan_of(scan).index)].name; };
+  context.warn(fmt::format(
+      "the graph is in pieces: the best missing link is {} to {}, which overlap by {:.1f} % (needed: {:.1f} "
+      "%); a scan that shows what both show would join them",
+      name(missing.first), name(missing.second), 100.0 * missing.overlap, 100.0 * options.graph.edges.low));
+}
+
 void describe_scans(io::RunRecord& record, const Registration& registration, const Context& context) {
   const std::vector<PosedScan>& scans = registration.scans;
   for (std::size_t number = 0; number < registration.components.size(); ++number) {
@@ -336,6 +353,7 @@ Result<Registration> register_poses(std::vector<PosedScan> scans, const LoadedMo
         recorded_refinement(registration.components[i], static_cast<int>(i), options, registration.scans));
   }
   describe_scans(record, registration, context);
+  name_missing_link(registration, record, options, context);
   return registration;
 }
 

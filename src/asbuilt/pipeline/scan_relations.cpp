@@ -66,6 +66,18 @@ refine::TurnAxis turn_axis(const model::SymmetryGroup& symmetry) {
   return {near.axis, near.point, 2.0 * std::numbers::pi / (has_turns ? symmetry.order : 1)};
 }
 
+// `looks` says to what turns the part is blind.
+void say_that_turns_are_unknown(std::string_view looks, const std::vector<PosedScan>& scans, io::RunRecord& record,
+                                const Context& context) {
+  for (const PosedScan& scan : scans) {
+    io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
+    if (!entry.reason_code.empty()) continue;
+    entry.reason_code = "symmetry";
+    entry.reason = fmt::format("{}: how it is turned against the other scans is not known", looks);
+  }
+  context.warn(fmt::format("{}: how the scans are turned against one another is not known", looks));
+}
+
 // `why` ends the sentence that no scan tells the placements apart.
 void say_that_nothing_tells(const RefinedComponent& component, std::size_t placements, std::string_view why,
                             std::vector<PosedScan>& scans, io::RunRecord& record, const Context& context) {
@@ -88,8 +100,15 @@ Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& mode
                           io::RunRecord& record, const Context& context) {
   const model::SymmetryGroup& symmetry = model.prepared.symmetry;
   using Kind = model::SymmetryGroup::Kind;
-  const bool is_round = symmetry.kind == Kind::revolution || symmetry.kind == Kind::sphere;
-  if (is_round || scans.size() < 2 || !verify::turns_are_nearly_equal(model.prepared, near_equal_ratio)) return {};
+  if (scans.size() < 2) return {};
+  if (symmetry.kind == Kind::revolution || symmetry.kind == Kind::sphere) {
+    // A dent may show in two scans, but not from where: turned at random they do not see it in the same place.
+    const std::string_view about = symmetry.kind == Kind::sphere ? "its centre" : "its axis";
+    say_that_turns_are_unknown(fmt::format("the part looks the same at any turn about {}", about), scans, record,
+                               context);
+    return {};
+  }
+  if (!verify::turns_are_nearly_equal(model.prepared, near_equal_ratio)) return {};
   const refine::TurnAxis axis = turn_axis(symmetry);
   std::vector<std::size_t> untold;
   for (std::size_t s = 0; s < scans.size(); ++s) {
@@ -106,15 +125,9 @@ Result<void> choose_turns(std::vector<PosedScan>& scans, const LoadedModel& mode
   }
   if (untold.empty()) return {};
   if (untold.size() + 2 > scans.size()) {
-    for (const PosedScan& scan : scans) {
-      io::ScanRecord& entry = record.scans[static_cast<std::size_t>(scan.index)];
-      if (!entry.reason_code.empty()) continue;
-      entry.reason_code = "symmetry";
-      entry.reason = "the part looks nearly the same at any turn about its axis, and the scans do not show theirs";
-    }
-    context.warn(
-        "the part looks nearly the same at any turn about its axis, and the scans do not show theirs: how they are "
-        "turned against one another is not known");
+    say_that_turns_are_unknown(
+        "the part looks nearly the same at any turn about its axis, and the scans do not show theirs", scans, record,
+        context);
     return {};
   }
   for (auto s = untold.rbegin(); s != untold.rend(); ++s) {

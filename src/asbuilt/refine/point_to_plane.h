@@ -7,15 +7,17 @@
 
 namespace asbuilt::refine {
 
-/// A residual and its derivative by a left twist of the pose of p. The derivative by a left twist of the pose of q is
-/// its negative: moving both by one motion leaves the residual as it is.
+/// A residual and its derivative by a left twist of the pose of p, both in the frame of the arguments, about its origin.
+/// The derivative by a left twist of the pose of q is its negative: moving both by one motion leaves the residual as it
+/// is.
 struct ResidualWithJacobian {
   double residual = 0.0;
   Vector6d jacobian = Vector6d::Zero();  ///< rotation (mm/rad), then translation (mm/mm)
 };
 
-/// Eq. 4 in the common frame, d = n . (p - q), where the normal n of q turns with the pose of q. In q's own scan frame
-/// it reads n_q . (theta_k^-1 theta_h p - q): the same number. All three arguments in the common frame.
+/// Eq. 4, d = n . (p - q), where the normal n of q turns with the pose of q; all three arguments in one frame. In the
+/// common frame p and q are theta_h p and theta_k q; in q's own scan frame it reads n_q . (theta_k^-1 theta_h p - q): the
+/// same number.
 [[nodiscard]] inline ResidualWithJacobian point_to_plane(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                                                          const Eigen::Vector3d& normal_q) {
   ResidualWithJacobian result;

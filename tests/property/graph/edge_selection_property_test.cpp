@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <random>
 
 #include "asbuilt/core/disjoint_sets.h"
@@ -28,7 +30,8 @@ EdgeSelectionOptions random_options(std::mt19937& random) {
   options.low = static_cast<double>(random() % 6) / 20.0;
   options.high = options.low + static_cast<double>(random() % 6) / 20.0;
   options.bridges_only = random() % 2 == 0;
-  options.max_degree = static_cast<int>(random() % 4);
+  options.max_degree = static_cast<int>(random() % 6);
+  options.enough_firm = static_cast<int>(random() % 4);
   return options;
 }
 
@@ -99,6 +102,31 @@ TEST(EdgeSelectionProperty, EveryStrongPairAndNoPairBelowLowIsLinked) {
       }
     }
   }
+}
+
+TEST(EdgeSelectionProperty, CandidatesAreAllStrongPairsWhateverTheCapAndTheOrder) {
+  std::size_t capped = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    std::vector<PairOverlap> overlaps = overlaps_with_many_ties(random);
+    EdgeSelectionOptions options = random_options(random);
+    const auto is_strong = [&](const PairOverlap& pair) { return pair.overlap >= options.high; };
+    std::vector<PairOverlap> strong;
+    std::ranges::copy_if(overlaps, std::back_inserter(strong), is_strong);
+    std::ranges::stable_sort(strong, std::ranges::greater{}, &PairOverlap::overlap);  // made by (first, second)
+    EXPECT_TRUE(std::ranges::is_sorted(strong, comes_before)) << "seed " << seed;
+    for (int draw = 0; draw < 4; ++draw) {
+      const EdgeSelection selection = select_edges(kScans, overlaps, options).value();
+      EXPECT_EQ(selection.candidates, strong)
+          << "seed " << seed << ", max_degree " << options.max_degree << ", enough_firm " << options.enough_firm;
+      if (std::ranges::count_if(selection.edges, is_strong) < std::ssize(strong)) ++capped;
+      const EdgeSelectionOptions other = random_options(random);
+      options.max_degree = other.max_degree;
+      options.enough_firm = other.enough_firm;
+      std::ranges::shuffle(overlaps, random);
+    }
+  }
+  EXPECT_GT(capped, 100U) << "a test of caps that are at work";
 }
 
 TEST(EdgeSelectionProperty, AWeakEdgeAlwaysJoinsTwoPieces) {

@@ -117,7 +117,7 @@ TEST(EdgeSelection, ADenseNetworkOfFirmLinksNeedsFewAndOneOfLooseLinksTheWholeCa
     const auto pairs = all_pairs(kMany, [&](int a, int b) { return firmness / (1.0 + 0.01 * (b - a)); });
     return 2.0 * static_cast<double>(select_edges(kMany, pairs).value().edges.size()) / kMany;
   };
-  EXPECT_GE(links_each(100.0), 4.0) << "as many as hold a scan";
+  EXPECT_GE(links_each(100.0), 4.0);
   EXPECT_LE(links_each(100.0), 8.0);
   EXPECT_GE(links_each(1.0), 11.0);
   EXPECT_LE(links_each(1.0), 14.0) << "the cap, and the forest that takes no notice of it";
@@ -129,6 +129,18 @@ TEST(EdgeSelection, AScanThatNoLinkHoldsFirmlyKeepsMoreAmongScansThatAreHeld) {
   const EdgeSelection selection = select_edges(kMany, pairs).value();
   EXPECT_EQ(links_of_each(kMany, selection)[kLoose], EdgeSelectionOptions{}.max_degree);
   EXPECT_LE(selection.edges.size(), 4U * kMany) << "the others stay at some four to eight";
+}
+
+TEST(EdgeSelection, TwoFirmCrowdsAreTiedByAsManyLooseLinksAsTheCapAllows) {
+  constexpr int kCrowd = 20;
+  const auto across = [](const PairOverlap& pair) { return pair.first < kCrowd && pair.second >= kCrowd; };
+  const auto pairs = all_pairs(2 * kCrowd, [&](int a, int b) {
+    return across({a, b}) ? 2.0 : 100.0 / (1.0 + 0.01 * (b - a));
+  });
+  const EdgeSelection selection = select_edges(2 * kCrowd, pairs).value();
+  const auto ties = std::ranges::count_if(selection.edges, across);
+  EXPECT_GE(ties, 8);
+  EXPECT_LE(static_cast<std::ptrdiff_t>(selection.edges.size()) - ties, 2 * kCrowd * 4) << "within, few are enough";
 }
 
 TEST(EdgeSelection, EnoughFirmLinksAreCountedOnlyWhereTheCapIsAtWork) {

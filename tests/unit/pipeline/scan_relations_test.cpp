@@ -102,6 +102,34 @@ TEST(ChooseTurns, TakesNothingOutWhereFewerThanTwoShowTheirs) {
   }
 }
 
+LoadedModel round_model(bool sphere) {
+  LoadedModel loaded;
+  loaded.prepared.symmetry.kind = sphere ? model::SymmetryGroup::Kind::sphere : model::SymmetryGroup::Kind::revolution;
+  return loaded;
+}
+
+TEST(ChooseTurns, SaysOfRoundPartsThatNobodyKnowsHowScansAreTurned) {
+  for (const bool sphere : {false, true}) {
+    std::vector<PosedScan> scans(3);
+    for (int i = 0; i < 3; ++i) scans[static_cast<std::size_t>(i)].index = i;
+    io::RunRecord record = record_of(3);
+    record.scans[1].reason_code = "accepted_by_user";
+    ASSERT_TRUE(choose_turns(scans, round_model(sphere), kNearEqual, record, Context(1)));
+    EXPECT_EQ(scans.size(), 3U) << "the surface is the same at any turn: nothing is left out";
+    for (const int other : {0, 2}) {
+      const io::ScanRecord& scan = record.scans[static_cast<std::size_t>(other)];
+      EXPECT_EQ(scan.status, io::ScanStatus::accepted);
+      EXPECT_EQ(scan.reason_code, "symmetry");
+      EXPECT_NE(scan.reason.find(sphere ? "its centre" : "its axis"), std::string::npos) << scan.reason;
+    }
+    EXPECT_EQ(record.scans[1].reason_code, "accepted_by_user");
+  }
+  std::vector<PosedScan> alone(1);
+  io::RunRecord record = record_of(1);
+  ASSERT_TRUE(choose_turns(alone, round_model(false), kNearEqual, record, Context(1)));
+  EXPECT_TRUE(record.scans[0].reason_code.empty()) << "one scan is turned against nobody";
+}
+
 TEST(ChooseTurns, LeavesAloneWhatTheUserVouchesForAndPartsWhoseTurnsDiffer) {
   std::vector<PosedScan> scans{scan_of(0, 0.5, true, 0.21), scan_of(1, 3.0, true, 0.4)};
   io::RunRecord record = record_of(2);

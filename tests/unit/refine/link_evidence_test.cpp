@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <numeric>
+
+#include "asbuilt/core/random.h"
+#include "asbuilt/refine/suspicious_view.h"
 
 namespace asbuilt::refine {
 namespace {
@@ -76,6 +80,60 @@ TEST(LinkEvidence, ViewsWithoutAViewpointSeeNothing) {
   const auto evidence = link_evidence(views, poses_of(views), all_pairs(2), Context(1)).value();
   EXPECT_EQ(evidence[0].agreeing + evidence[0].contradicting, 0U);
   EXPECT_EQ(evidence[0].share(), 0.0);
+}
+
+constexpr int kOnRing = 12;
+
+// Of the views that are left of a ring: those up to three places apart are linked.
+std::vector<Link> links_on_ring(const std::vector<int>& left) {
+  std::vector<Link> links;
+  for (std::size_t a = 0; a < left.size(); ++a) {
+    for (std::size_t b = a + 1; b < left.size(); ++b) {
+      const int one_way = left[b] - left[a];
+      if (std::min(one_way, kOnRing - one_way) <= 3) links.push_back({static_cast<int>(a), static_cast<int>(b)});
+    }
+  }
+  return links;
+}
+
+// Refines from the starting poses, asks, drops who is named, and again until nobody is.
+struct Dropping {
+  Dropping(const std::vector<View>& starts, const RefineOptions& options) : left(starts.size()) {
+    std::iota(left.begin(), left.end(), 0);
+    while (true) {
+      std::vector<View> views;
+      for (const int view : left) views.push_back(starts[static_cast<std::size_t>(view)]);
+      const std::vector<Link> links = links_on_ring(left);
+      refinement = refine(views, links, options, Context(2)).value();
+      const auto found = view_against_others(views, links, refinement, Context(2)).value();
+      if (!found) return;
+      dropped.push_back(left[static_cast<std::size_t>(found->view)]);
+      left.erase(left.begin() + found->view);
+    }
+  }
+
+  std::vector<int> left, dropped;
+  Refinement refinement;  // of those that are left
+};
+
+TEST(ViewAgainstOthers, TwoOfTwelveThatStandWrongAreDroppedOneAfterTheOtherAndNobodyElse) {
+  RefineOptions options;
+  options.points_per_scan = 500;  // enough for a plate
+  // The others look through what is lifted, and what is sunk looks through them; the last two agree with one another.
+  for (const double second_mm : {-12.0, 20.0}) {
+    std::vector<View> views(kOnRing, plate_seen_from_above(0.0F));
+    Random random(1, "plates on a ring", 0);
+    for (View& view : views) view.model_from_scan.translation().z() = random.uniform(-0.3, 0.3);
+    views[4].model_from_scan.translation().z() = 20.0;  // further off than correspondences are searched
+    views[6].model_from_scan.translation().z() = second_mm;
+    const Dropping result(views, options);
+    EXPECT_THAT(result.dropped, testing::UnorderedElementsAre(4, 6)) << second_mm;
+    // The data are perfect, and a step of a fiftieth of the noise ends it.
+    const Pose first_from_model = result.refinement.model_from_scan[0].inverse();
+    for (const Pose& pose : result.refinement.model_from_scan) {
+      EXPECT_NEAR((first_from_model * pose).translation().z(), 0.0, 0.2 * views[0].noise_sigma_mm) << second_mm;
+    }
+  }
 }
 
 TEST(SeenThrough, MarksWhatOthersLookedThroughAndNothingElse) {

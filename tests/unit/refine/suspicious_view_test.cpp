@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <vector>
+
 namespace asbuilt::refine {
 namespace {
 
@@ -59,6 +61,21 @@ TEST(SuspiciousView, IsNotJudgedByEdgesWithHardlyAnyPoints) {
 TEST(SuspiciousView, IsNotNamedForDifferencesBelowTheFloor) {
   EXPECT_TRUE(suspicious_view(5, complete_graph(5, 3, 1.0), 0.1));
   EXPECT_FALSE(suspicious_view(5, complete_graph(5, 3, 1.0), 1.0));
+}
+
+TEST(SuspiciousView, OfTwoAmongTwelveIsFirstTheWorseAndThenTheOther) {
+  auto edges = complete_graph(12, 3, 5.0);
+  for (EdgeResidual& edge : edges) {
+    const bool of_worse = edge.first == 3 || edge.second == 3;
+    if (!of_worse && (edge.first == 8 || edge.second == 8)) edge.spread_mm = 1.0;
+  }
+  std::vector<int> named;
+  while (const auto found = suspicious_view(12, edges)) {
+    const int view = found->view;
+    named.push_back(view);
+    std::erase_if(edges, [&](const EdgeResidual& edge) { return edge.first == view || edge.second == view; });
+  }
+  EXPECT_THAT(named, testing::ElementsAre(3, 8));
 }
 
 TEST(SuspiciousView, OfAnEmptyGraphIsNobody) {
