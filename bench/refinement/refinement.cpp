@@ -27,6 +27,8 @@ struct Arguments {
   std::vector<int> degrees{graph::PoseGraphOptions{}.edges.max_degree, 0};
   int enough_firm = graph::PoseGraphOptions{}.edges.enough_firm;
   double angle = 0.0, shift = 0.0;
+  double deviation = -1.0;  // drawn for each scene
+  double window = 1.0;
   int seeds = 10, count = 40, first = 0, scenes = 20, points = 60000, threads = 0;
 };
 
@@ -65,7 +67,7 @@ Result<void> run_own(const Arguments& args) {
   const Context context(args.threads);
   ASBUILT_TRY(parts, scene_parts(args));
   for (int number = args.first; number < args.first + args.scenes; ++number) {
-    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, args.deviation, context));
     ASBUILT_TRY(trials, start_trials(scene, 1, context));
     for (Trial& trial : trials) trial.kind = args.cad.empty() ? "own" : "cad";
     ASBUILT_CHECK(append(args, trials));
@@ -89,7 +91,7 @@ Result<void> run_wrong(const Arguments& args) {
   }
   ASBUILT_TRY(parts, scene_parts(args));
   for (int number = 0; number < args.scenes; ++number) {
-    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, args.deviation, context));
     ASBUILT_CHECK(run_on(scene));
   }
   return {};
@@ -104,7 +106,8 @@ Result<void> run_scale(const Arguments& args) {
     return fail(ErrorCode::invalid_argument,
                 fmt::format("--part {}: expected one of {}", args.part, fmt::join(names, ", ")));
   }
-  ASBUILT_TRY(trials, scale_trials(*part, args.scans, args.degrees, args.enough_firm, Context(args.threads)));
+  ASBUILT_TRY(trials,
+              scale_trials(*part, args.scans, args.degrees, args.enough_firm, args.window, Context(args.threads)));
   return append(args, trials);
 }
 
@@ -166,7 +169,7 @@ Result<void> run_one(const Arguments& args) {
   const Context context(args.threads);
   ASBUILT_TRY(parts, scene_parts(args));
   for (const int number : args.own) {
-    ASBUILT_TRY(scene, own_scene(number, parts, args.points, context));
+    ASBUILT_TRY(scene, own_scene(number, parts, args.points, args.deviation, context));
     ASBUILT_CHECK(one(scene, context));
   }
   return {};
@@ -205,11 +208,14 @@ int run(int argc, char** argv) {
   }
   for (CLI::App* command : {own, wrong, one}) {
     command->add_option("--points", args.points, "of a scan of our own simulator");
+    command->add_option("--deviation", args.deviation, "as-built deviation / diameter (default: 0.2 to 1 %, drawn)");
   }
   scale->add_option("--scans", args.scans);
   scale->add_option("--part", args.part, "one of our own, or of --cad")->capture_default_str();
   scale->add_option("--degrees", args.degrees, "links that a scan may have; 0: all");
   scale->add_option("--enough-firm", args.enough_firm, "firm links with which it needs no more; 0: up to the cap");
+  scale->add_option("--window", args.window, "share of the part's length that a scan sees; 1: all it can")
+      ->check(CLI::Range(0.05, 1.0));
   one->add_option("--set", args.settings, "NAME=NUMBER");
   one->add_option("--angle", args.angle);
   one->add_option("--shift", args.shift);

@@ -47,10 +47,34 @@ std::vector<refine::Link> links_among(const graph::PoseGraph& graph, const std::
   return links;
 }
 
+// Leaves of each view what lies in a window of that share of the part's length, as of a sensor that is carried along
+// it. The middles of the first views are spread as evenly as those of all.
+void look_along(RefinementScene& scene, double window) {
+  const Eigen::AlignedBox3d& box = scene.prepared.box;
+  Eigen::Index axis = 0;
+  const double length = box.sizes().maxCoeff(&axis);
+  constexpr double kGoldenRatio = 0.6180339887498949;
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    const double part = std::fmod(kGoldenRatio * static_cast<double>(v), 1.0);
+    const double middle = box.min()[axis] + length * (0.5 * window + (1.0 - window) * part);
+    const PointCloud& whole = scene.views[v].segment_in_scan;
+    PointCloud kept;
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      const double along = (scene.truth[v] * whole.positions[i].cast<double>())[axis];
+      if (std::abs(along - middle) > 0.5 * window * length) continue;
+      kept.positions.push_back(whole.positions[i]);
+      kept.normals.push_back(whole.normals[i]);
+    }
+    scene.views[v].segment_in_scan = std::move(kept);
+  }
+}
+
 // What tells trials of `scale` apart.
-std::string scale_variant(int scans, int max_degree, int enough_firm) {
-  if (max_degree == 0) return fmt::format("{} scans, all links", scans);
-  const std::string text = fmt::format("{} scans, at most {} links each", scans, max_degree);
+std::string scale_variant(int scans, int max_degree, int enough_firm, double window) {
+  const std::string seen = window < 1.0 ? fmt::format("{} scans of {:.0f} % of the length", scans, 100.0 * window)
+                                        : fmt::format("{} scans", scans);
+  if (max_degree == 0) return seen + ", all links";
+  const std::string text = fmt::format("{}, at most {} links each", seen, max_degree);
   return enough_firm == 0 ? text : fmt::format("{}, {} firm ones enough", text, enough_firm);
 }
 
@@ -263,7 +287,8 @@ Result<std::vector<ScenePart>> cad_scene_parts(const std::filesystem::path& fold
               fmt::format("{}: holds none of the CAD files that bench/README.md lists", folder.string()));
 }
 
-Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points, const Context& context) {
+Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points, double deviation_ratio,
+                                  const Context& context) {
   const ScenePart& part = parts[static_cast<std::size_t>(number) % parts.size()];
   Random random(static_cast<std::uint64_t>(number), "own scene", 0);
   simulate::SimulateOptions options;
@@ -274,7 +299,7 @@ Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, 
   options.clutter_objects = 4;
   options.noise_ratio = 0.0003 * std::pow(5.0, random.uniform());
   // Warp and dents together make 0.2 to 1 % of the diameter.
-  const double deviation = random.uniform(0.002, 0.01);
+  const double drawn = random.uniform(0.002, 0.01), deviation = deviation_ratio < 0.0 ? drawn : deviation_ratio;
   options.as_built.warp_ratio = 0.6 * deviation;
   options.as_built.bump_height_ratio = 0.4 * deviation;
   options.as_built.dents = 2;
@@ -283,15 +308,16 @@ Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, 
 }
 
 Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans, std::span<const int> degrees,
-                                        int enough_firm, const Context& context) {
+                                        int enough_firm, double window, const Context& context) {
   std::vector<Trial> trials;
   const int most = *std::ranges::max_element(scans);
   simulate::SimulateOptions options;
   options.scans = most;
-  options.points = 12000;
+  options.points = static_cast<int>(12000 / window);
   options.clutter_objects = 0;
   options.pose = "any";
   ASBUILT_TRY(all, simulated_scene(part.name, part.mesh, options, context));
+  if (window < 1.0) look_along(all, window);
   const auto add = [&](int count, int max_degree) -> Result<void> {
     RefinementScene scene;
     scene.name = all.name;
@@ -307,7 +333,7 @@ Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const i
     graph_options.edges.max_degree = max_degree;
     graph_options.edges.enough_firm = enough_firm;
     ASBUILT_TRY(run, joint_run(scene, perturbed(scene, 1.0, 0.01, 0), {}, context, graph_options));
-    Trial trial = trial_of("scale", scene, scale_variant(count, max_degree, enough_firm), 0, run);
+    Trial trial = trial_of("scale", scene, scale_variant(count, max_degree, enough_firm, window), 0, run);
     trial.figures["error_sigma"] = AccuracyJudge(scene).relative_pose_error(run.poses, run.members);
     trials.push_back(std::move(trial));
     return {};

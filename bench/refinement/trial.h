@@ -61,16 +61,17 @@ struct ScenePart {
 [[nodiscard]] Result<std::vector<ScenePart>> cad_scene_parts(const std::filesystem::path& folder);
 
 /// Scene `number` of our own simulator, of part `number` modulo their count, with an as-built deviation of 0.2 to 1 %
-/// of the diameter, 8 scans of `points` points. `parts` may not be empty.
+/// of the diameter, or of `deviation_ratio` if that is not negative, 8 scans of `points` points. `parts` may not be
+/// empty.
 [[nodiscard]] Result<RefinementScene> own_scene(int number, std::span<const ScenePart> parts, int points,
-                                                const Context& context);
+                                                double deviation_ratio, const Context& context);
 
 /// Many scans of `part`, from 1 degree and 1 % off: time and error against the number of scans, for each number of
 /// links that a scan may have (0: all, up to 128 scans). Under such a cap a scan in a dense network needs no further
-/// link once it has `enough_firm` firm ones (0: links up to the cap). Of several numbers of scans the smallest runs
-/// first and last. Neither list may be empty.
+/// link once it has `enough_firm` firm ones (0: links up to the cap). Each scan sees the share `window` of the part's
+/// length (1: all it can). Of several numbers of scans the smallest runs first and last. Neither list may be empty.
 [[nodiscard]] Result<std::vector<Trial>> scale_trials(const ScenePart& part, std::span<const int> scans,
-                                                      std::span<const int> degrees, int enough_firm,
+                                                      std::span<const int> degrees, int enough_firm, double window,
                                                       const Context& context);
 
 }  // namespace asbuilt::bench
