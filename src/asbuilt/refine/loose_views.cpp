@@ -31,10 +31,15 @@ Result<Refinement> refine_on_model(std::span<const View> views, std::span<const 
   // what nothing holds. The first is to be dropped: held on the CAD it would stand as firmly as the right ones.
   ASBUILT_TRY(contradicted, view_against_others(views, links, *by_scans, context));
   if (contradicted && on_model[static_cast<std::size_t>(contradicted->view)].share_off > kMostOff) return by_scans;
-  ASBUILT_TRY(with_model, refine(views, links, options, context, on_model));
-  with_model.rms_before_mm = by_scans->rms_before_mm;
-  with_model.iterations += by_scans->iterations;
-  return std::move(with_model);
+  auto with_model = refine(views, links, options, context, on_model);
+  if (!with_model) {
+    // Fitted each by itself, as round parts are, views may have nothing left in common: what links told stands.
+    if (with_model.error().code == ErrorCode::not_possible) return by_scans;
+    return with_model;
+  }
+  with_model->rms_before_mm = by_scans->rms_before_mm;
+  with_model->iterations += by_scans->iterations;
+  return with_model;
 }
 
 }  // namespace asbuilt::refine
