@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surfaces of a reconstruction against the true one; a Markdown table. SCENE: simulate's folder, RESULT: reconstruct's."""
-import json, math, os, subprocess, sys, time
+import json, math, subprocess, sys, time
 
 import numpy as np
 import open3d as o3d
@@ -74,8 +74,8 @@ def sharp_edge_points(mesh):
 
 
 def open_edges(mesh):
-    return len(np.asarray(mesh.get_non_manifold_edges(allow_boundary_edges=True))), len(
-        np.asarray(mesh.get_non_manifold_edges(allow_boundary_edges=False)))
+    return len(mesh.get_non_manifold_edges(allow_boundary_edges=False)) - len(
+        mesh.get_non_manifold_edges(allow_boundary_edges=True))
 
 
 def near_cloud(at):
@@ -86,10 +86,9 @@ def near_cloud(at):
 def by_pcl(program, *options):
     """A surface by one of PCL's programs, in the frame of the cloud."""
     base = f"{result}/../peer"
-    if not os.path.exists(f"{base}.pcd"):
-        bare = o3d.geometry.PointCloud(cloud.points)
-        bare.normals = cloud.normals
-        o3d.io.write_point_cloud(f"{base}.pcd", bare)
+    bare = o3d.geometry.PointCloud(cloud.points)
+    bare.normals = cloud.normals
+    o3d.io.write_point_cloud(f"{base}.pcd", bare)
     for command in ([program, f"{base}.pcd", f"{base}.vtk", *options], ["pcl_vtk2ply", f"{base}.vtk", f"{base}.ply"]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return o3d.io.read_triangle_mesh(f"{base}.ply")
@@ -130,9 +129,8 @@ for name, make in surfaces:
     measured = near_cloud(samples)
     off = distance(true_rays, samples)
     rays = caster(mesh)
-    bad, with_open = open_edges(mesh)
     made_up = off[~measured]
     print(f"| {name} | {len(mesh.triangles)} | {off[measured].mean():.3f} | {np.quantile(off[measured], 0.99):.3f} | "
           f"{100 * np.mean(distance(rays, true_samples) < 3 * sigma):.2f} | {distance(rays, edges).mean():.3f} | "
-          f"{100 * np.mean(~measured):.1f} | {made_up.mean() if len(made_up) else float('nan'):.2f} | {with_open - bad} | "
+          f"{100 * np.mean(~measured):.1f} | {made_up.mean() if len(made_up) else float('nan'):.2f} | {open_edges(mesh)} | "
           f"{f'{seconds:.1f}' if name.startswith('PCL') else 'in the run'} |")

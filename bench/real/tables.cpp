@@ -10,17 +10,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A number with so many digits, or a dash where there is none.
-std::string number(const Json& object, const char* key, int digits) {
+// A number with so many digits, times `units`, or a dash where there is none.
+std::string number(const Json& object, const char* key, int digits, double units = 1.0) {
   if (!object.contains(key) || !object.at(key).is_number()) return "-";
-  return fmt::format("{:.{}f}", object.at(key).get<double>(), digits);
+  return fmt::format("{:.{}f}", units * object.at(key).get<double>(), digits);
 }
 
 // The same of a share, in %.
-std::string percent(const Json& object, const char* key, int digits) {
-  if (!object.contains(key) || !object.at(key).is_number()) return "-";
-  return fmt::format("{:.{}f}", 100.0 * object.at(key).get<double>(), digits);
-}
+std::string percent(const Json& object, const char* key, int digits) { return number(object, key, digits, 100.0); }
 
 // The mean over the scans that have it, in %.
 std::string mean_percent(const Json& evaluation, const char* key, int digits) {
