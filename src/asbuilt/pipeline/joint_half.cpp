@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -216,10 +217,12 @@ void describe_hold(io::ScanRecord& scan, const refine::ViewHold& hold, const Con
 void name_missing_link(const Registration& registration, const io::RunRecord& record, const Options& options,
                        const Context& context) {
   const auto scan_of = [&](int scan) -> const PosedScan& { return registration.scans[static_cast<std::size_t>(scan)]; };
-  graph::PoseGraph of_one_individual = registration.graph;
-  std::erase_if(of_one_individual.overlaps, [&](const graph::PairOverlap& pair) {
-    return scan_of(pair.first).individual != scan_of(pair.second).individual;
-  });
+  graph::PoseGraph of_one_individual;
+  of_one_individual.components = registration.graph.components;
+  std::ranges::copy_if(registration.graph.overlaps, std::back_inserter(of_one_individual.overlaps),
+                       [&](const graph::PairOverlap& pair) {
+                         return scan_of(pair.first).individual == scan_of(pair.second).individual;
+                       });
   const graph::PairOverlap missing = graph::best_missing_link(of_one_individual);
   if (missing.first < 0) return;  // one piece, or pieces that share nothing: each scan says so itself
   const auto name = [&](int scan) { return record.scans[static_cast<std::size_t>(scan_of(scan).index)].name; };

@@ -13,7 +13,7 @@ namespace asbuilt::refine {
 
 /// The residual of a match, in the frame of the edge's target with positions relative to `origin_in_common` (which
 /// keeps the rotation columns small). There a match takes one motion instead of three, and the residual is the same
-/// number. What is derived and summed there is turned into the common frame by rotation(), once for all matches.
+/// number. rotation() takes what is derived and summed there to the common frame.
 class EdgeResidualFunction {
  public:
   EdgeResidualFunction(const DirectedEdge& edge, std::span<const SampledView> views, std::span<const Pose> poses,
